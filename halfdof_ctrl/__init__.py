@@ -1,0 +1,29 @@
+"""Exact state space of mechanical models with singular mass, for python-control."""
+
+from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, zeros
+from halfdof_ctrl.errors import HalfdofError
+from halfdof_ctrl.model import SecondOrderModel, mechss
+from halfdof_ctrl.mounts import hydromount
+from halfdof_ctrl.reduction import ExactReduction, exact_reduction
+from halfdof_ctrl.response import descriptor_response, frequency_response
+from halfdof_ctrl.statespace import mech2ss
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CrossCheck",
+    "ExactReduction",
+    "HalfdofError",
+    "PencilStructure",
+    "SecondOrderModel",
+    "crosscheck",
+    "descriptor_response",
+    "exact_reduction",
+    "frequency_response",
+    "hydromount",
+    "mech2ss",
+    "mechss",
+    "pencil_structure",
+    "zeros",
+]

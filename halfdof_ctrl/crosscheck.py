@@ -1,0 +1,286 @@
+"""Compare a state space with the descriptor form of its model, by routes that share no code.
+
+| quantity | descriptor form | state space |
+|---|---|---|
+| count | finite eigenvalues left by deflation | order |
+| poles | QZ, matched one to one | eigenvalues of A |
+| transfer function | direct solves of equation (1) | direct solves with balanced A, B, C, D |
+| step response | Radau IIA on the descriptor equations | `control.forced_response` |
+
+Errors are relative to the largest value of each channel, since pointwise ones explode in roll-off; those
+are given beside them. What `sys(s)` of python-control itself loses is measured too, and is no reason to fail.
+"""
+
+from dataclasses import asdict, dataclass
+
+import control
+import numpy as np
+import scipy.linalg
+import scipy.optimize
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, require_regular
+from halfdof_ctrl.errors import MatrixError
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.radau import descriptor_step_response, step_plan
+from halfdof_ctrl.reduction import complex_model_error
+
+TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
+POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
+STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
+ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault, in first order
+CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
+GRID_POINTS = 60  #: points on the axis besides those at the poles
+MOST_POLE_POINTS = 100  #: poles that get a point of their own
+OFF_AXIS = (1.0 + 0.0j, 1.0 + 1.0j)  #: directions of the points off the axis, in units of a pole's size
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, repr=False)
+class CrossCheck:
+    """The errors of a state space against its descriptor form. Printing it gives a table."""
+
+    order: int  #: states
+    n_finite: int  #: finite eigenvalues of the descriptor form
+    n_infinite: int  #: infinite ones
+    max_transfer_error: float  #: relative to the channel's largest value (Notes of `crosscheck`)
+    transfer_worst: str  #: where: output, input, s
+    max_pointwise_error: float  #: the same, relative to each value
+    max_pole_error: float  #: relative to each pole (Notes of `crosscheck`)
+    pole_worst: str  #: which pole
+    max_step_error: float  #: relative to the channel's largest value
+    step_worst: str  #: where: output, input, t
+    step_horizon: float  #: how far the step response was followed [s]
+    evaluation_error: float  #: of python-control's sys(s) against a direct solve with the same A, B, C, D
+
+    @property
+    def passed(self) -> bool:
+        """Whether the count agrees and every error is within its tolerance."""
+        return (
+            self.order == self.n_finite
+            and self.max_transfer_error <= TRANSFER_TOLERANCE
+            and self.max_pole_error <= POLE_TOLERANCE
+            and self.max_step_error <= STEP_TOLERANCE
+        )
+
+    def as_dict(self) -> dict[str, bool | int | float | str]:
+        """Give the verdict and all figures, as for a JSON file."""
+        return {"passed": self.passed, **asdict(self)}
+
+    def __repr__(self) -> str:
+        """Print as a small table."""
+        count = f"{self.n_finite} finite, {self.n_infinite} infinite"
+        rows = [
+            ("states", f"{self.order}", count, self.order == self.n_finite),
+            (
+                "transfer",
+                f"{self.max_transfer_error:.1e}",
+                self.transfer_worst,
+                self.max_transfer_error <= TRANSFER_TOLERANCE,
+            ),
+            ("poles", f"{self.max_pole_error:.1e}", self.pole_worst, self.max_pole_error <= POLE_TOLERANCE),
+            ("step", f"{self.max_step_error:.1e}", self.step_worst, self.max_step_error <= STEP_TOLERANCE),
+        ]
+        lines = [f"{'':10}{'error':>10}  {'verdict':8}  worst at"]
+        lines += [f"{what:10}{error:>10}  {'ok' if good else 'FAILED':8}  {where}" for what, error, where, good in rows]
+        lines.append(
+            f"{'pointwise':10}{self.max_pointwise_error:>10.1e}  {'(info)':8}  transfer, relative to each value"
+        )
+        lines.append(f"{'sys(s)':10}{self.evaluation_error:>10.1e}  {'(info)':8}  python-control's own evaluation")
+        return "\n".join(["Cross-check passed" if self.passed else "Cross-check FAILED", *lines])
+
+
+def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
+    """Check a state space against the descriptor form of the model that it claims to be.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        A real, regular model.
+    sys : control.StateSpace
+        With as many inputs and outputs, in the model's order.
+
+    Returns
+    -------
+    CrossCheck
+        Errors and where they are worst; `passed` is the verdict. The limits are 1e-10 for the transfer
+        function and the poles, 1e-9 for the step response.
+
+    Raises
+    ------
+    ComplexModelError, SingularPencilError
+        The model has no real state space.
+    MatrixError
+        Another number of inputs or outputs.
+
+    Notes
+    -----
+    A pole's error is compared with ``1e-10 |pole|`` plus what rounding of A moves it in first order,
+    16 eps |A| over the cosine between its left and right eigenvectors, and a transfer function's error with 1e-10 of
+    the channel's largest value plus 16 eps |y| |A| |x|, x and y the solutions for input and output. So a double
+    pole or a sharp resonance raises no false alarm. The figures are scaled so that 1e-10 is the limit.
+
+    Examples
+    --------
+    >>> model = hydromount()
+    >>> crosscheck(model, mech2ss(model)).passed
+    True
+    """
+    if model.is_complex:
+        raise complex_model_error(model)
+    if (sys.noutputs, sys.ninputs) != model.D.shape:
+        msg = (
+            f"The system has {sys.noutputs} outputs and {sys.ninputs} inputs, the model {len(model.outputs)} and "
+            f"{len(model.inputs)}. Compare it with the model it was made of."
+        )
+        raise MatrixError(msg, matrix="D")
+    require_regular(model)
+    structure = pencil_structure(model)
+    system = _Balanced.of(sys)
+    transfer = _compare_transfer(model, system, sys, structure)
+    pole_error, pole_worst = _compare_poles(system.A, structure.finite_eigenvalues)
+    step_error, step_worst, horizon = _compare_steps(model, sys, structure)
+    return CrossCheck(
+        order=sys.nstates,
+        n_finite=structure.finite_eigenvalues.size,
+        n_infinite=structure.n_infinite,
+        max_transfer_error=transfer.error,
+        transfer_worst=transfer.worst,
+        max_pointwise_error=transfer.pointwise,
+        evaluation_error=transfer.evaluation,
+        max_pole_error=pole_error,
+        pole_worst=pole_worst,
+        max_step_error=step_error,
+        step_worst=step_worst,
+        step_horizon=horizon,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Balanced:
+    """A state space with its states scaled by powers of two."""
+
+    A: FloatArray
+    B: FloatArray
+    C: FloatArray
+    D: FloatArray
+
+    @classmethod
+    def of(cls, sys: control.StateSpace) -> "_Balanced":
+        A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
+        if A.size == 0:
+            return cls(A, B, C, D)
+        balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+        return cls(balanced, B / scale[:, None], C * scale, D)
+
+    def __call__(self, points: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+        """Evaluate by a solve a point, (p, m, k), with the change that rounding in A makes, |y| |A| |x|."""
+        size, unit = np.abs(self.A), np.eye(self.A.shape[0])
+        values, changes = [], []
+        for s in points:
+            shifted = s * unit - self.A
+            x, y = np.linalg.solve(shifted, self.B), np.linalg.solve(shifted.T, self.C.T)
+            values.append(self.C @ x + self.D)
+            changes.append(ROUNDING * np.abs(y).T @ size @ np.abs(x))
+        return np.stack(values, axis=2), np.stack(changes, axis=2)
+
+
+@dataclass(frozen=True, slots=True)
+class _TransferErrors:
+    error: float
+    worst: str
+    pointwise: float
+    evaluation: float
+
+
+def _compare_transfer(
+    model: SecondOrderModel, system: _Balanced, sys: control.StateSpace, structure: PencilStructure
+) -> _TransferErrors:
+    points = _points(structure.finite_eigenvalues)
+    exact = model(points, squeeze=False)
+    found, rounding = system(points)
+    difference, size = np.abs(found - exact), np.abs(exact)
+    largest = _channel_size(size)
+    errors = difference / (largest + rounding / TRANSFER_TOLERANCE)
+    i, j, k = np.unravel_index(np.argmax(errors), errors.shape)
+    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {_in_words(points[k])}"
+    with np.errstate(divide="ignore", invalid="ignore"):
+        pointwise = np.where(difference > 0.0, difference / size, 0.0)
+    evaluated = np.asarray(sys(points, squeeze=False, warn_infinite=False))
+    evaluation = float((np.abs(evaluated - found) / largest).max())
+    return _TransferErrors(float(errors[i, j, k]), worst, float(pointwise.max()), evaluation)
+
+
+def _points(poles: ComplexArray) -> ComplexArray:
+    """Choose points on the imaginary axis around and at the poles, and off the axis."""
+    size = np.abs(poles)
+    moving = poles[size > 1e-9 * size.max(initial=0.0)]
+    if moving.size == 0:
+        moving = np.array([1.0 + 0.0j])
+    chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
+    low, high = np.abs(moving).min(), np.abs(moving).max()
+    grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
+    lift = np.maximum(0.0, CLEARANCE * np.abs(chosen) - np.abs(chosen.real))
+    at_poles = lift + 1j * np.abs(chosen.imag)
+    at_sizes = 1j * np.abs(chosen)
+    off_axis = np.concatenate([direction * np.array([low, np.sqrt(low * high), high]) for direction in OFF_AXIS])
+    points = np.concatenate([1j * grid, at_poles, at_sizes, off_axis])
+    near = np.abs(points[:, None] - moving).min(axis=1) < CLEARANCE * np.abs(points)
+    return np.where(near, points + CLEARANCE * np.abs(points), points)
+
+
+def _compare_poles(A: FloatArray, finite: ComplexArray) -> tuple[float, str]:
+    """Match the poles one to one and find the worst of them."""
+    if A.shape[0] != finite.size:
+        return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
+    if finite.size == 0:
+        return 0.0, "no poles"
+    poles, left, right = scipy.linalg.eig(A, left=True, right=True)
+    rows, columns = scipy.optimize.linear_sum_assignment(np.abs(poles[:, None] - finite))
+    cosine = np.abs(np.einsum("ij,ij->j", left.conj(), right))[rows]
+    with np.errstate(divide="ignore"):
+        rounding = ROUNDING * np.linalg.norm(A, 2) / cosine
+    difference = np.abs(poles[rows] - finite[columns])
+    allowed = np.abs(finite[columns]) + rounding / POLE_TOLERANCE
+    errors = np.where(difference > 0.0, difference / allowed, 0.0)
+    worst = int(np.argmax(errors))
+    return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"
+
+
+def _compare_steps(
+    model: SecondOrderModel, sys: control.StateSpace, structure: PencilStructure
+) -> tuple[float, str, float]:
+    """Follow the response to a step of each input by both roads, segment by segment."""
+    plan = step_plan(structure.finite_eigenvalues)
+    exact = descriptor_step_response(model, plan)
+    found = np.empty_like(exact)
+    times: list[FloatArray] = []
+    for j in range(sys.ninputs):
+        state, done, start = np.zeros(sys.nstates), 0, 0.0
+        for segment in plan:
+            time = segment.h * np.arange(segment.steps + 1)
+            inputs = np.zeros((sys.ninputs, time.size))
+            inputs[j] = 1.0
+            part = control.forced_response(sys, time, inputs, initial_state=state, return_states=True, squeeze=False)
+            found[:, j, done : done + segment.steps] = np.asarray(part.y).reshape(sys.noutputs, -1)[:, 1:]
+            state = np.asarray(part.x).reshape(sys.nstates, -1)[:, -1]
+            if j == 0:
+                times.append(start + time[1:])
+            done, start = done + segment.steps, start + time[-1]
+    time = np.concatenate(times)
+    errors = np.abs(found - exact) / _channel_size(np.abs(exact))
+    i, j, k = np.unravel_index(np.argmax(errors), errors.shape)
+    return float(errors[i, j, k]), f"{model.outputs[i]} from {model.inputs[j]} at t = {time[k]:.4g} s", float(time[-1])
+
+
+def _channel_size(size: FloatArray) -> FloatArray:
+    """Give the largest value of each channel (p, m, 1); of the whole response where a channel is zero."""
+    largest = size.max(axis=2, keepdims=True)
+    overall = size.max(initial=0.0)
+    return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
+
+
+def _in_words(s: complex) -> str:
+    """Write a complex frequency with four digits."""
+    if s.imag == 0.0:
+        return f"{s.real:.4g}"
+    return f"{s.real:.4g}{s.imag:+.4g}j" if s.real != 0.0 else f"{s.imag:.4g}j"

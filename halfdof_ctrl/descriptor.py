@@ -1,0 +1,190 @@
+"""The oracle: what the descriptor form itself says, by routes that the reduction does not take.
+
+The eigenvalues come from the first-order pencil in (q, w), w = V^T q', that follows from the singular
+value decomposition M = U S V^T of rank r:
+
+    [ C   U S ] [q']   [ -K  0 ] [q]
+    [ V^T  0  ] [w'] = [  0  I ] [w]                                                       (8)
+
+It has dimension n + r, and the 2n - (n + r) eigenvalues at infinity that a companion form has besides
+belong to the velocities of directions without mass. Zeros are the finite eigenvalues of the system pencil
+
+    [ P(s)  -B(s) ]
+    [ F(s)   D(s) ]                                                                        (9)
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.errors import SingularPencilError
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.names import listed
+from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, equilibrating_powers, finite_part, powers_of_two
+
+GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where det P(s) is looked at, in units of the time scale
+NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class PencilStructure:
+    """Eigenvalues of ``P(s)`` for n DOFs, found without the reduction."""
+
+    finite_eigenvalues: ComplexArray  #: by QZ [rad/s], sorted by size
+    n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
+    index: int  #: of the first-order form (8): 0 or 1 for passive structures
+    is_regular: bool  #: whether det P(s) is not identically zero
+    gap: float  #: smallest ratio of a singular value that counts to one that does not, in all rank decisions
+
+
+def pencil_structure(model: SecondOrderModel) -> PencilStructure:
+    """Find the finite eigenvalues of the descriptor form and count the infinite ones.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Real or complex, with any M, C, K.
+
+    Returns
+    -------
+    PencilStructure
+        With a singular pencil the finite eigenvalues are those of its regular part.
+
+    Examples
+    --------
+    A damper of 5 N s/m against a spring of 10 N/m, no mass:
+
+    >>> structure = pencil_structure(mechss([[0]], [[5]], [[10]]))
+    >>> structure.finite_eigenvalues.real.round(12).tolist(), structure.n_infinite
+    ([-2.0], 1)
+    """
+    part, scale = _quadratic_pencil((model.K, model.C, model.M))
+    finite = _sorted(part.eigenvalues * scale)
+    return PencilStructure(
+        finite_eigenvalues=finite,
+        n_infinite=2 * len(model.dofs) - finite.size,
+        index=len(part.steps),
+        is_regular=part.is_regular,
+        gap=part.gap,
+    )
+
+
+def zeros(model: SecondOrderModel) -> ComplexArray:
+    """Find the transmission zeros from the second-order system pencil.
+
+    The pencil keeps the mechanical form, so that no zeros are lost or invented where a state space
+    would have long chains at infinity.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        With any number of inputs and outputs; zeros of a model with more inputs than outputs (or the
+        reverse) are the points where its rank drops.
+
+    Returns
+    -------
+    (k,) complex ndarray
+        Finite zeros [rad/s], sorted by size. Among them are poles of motions that the inputs do not
+        reach or the outputs do not show.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+
+    Examples
+    --------
+    A mass on a damper and a spring, velocity as output: one zero, at the origin.
+
+    >>> zeros(mechss([[1]], [[2]], [[3]], [[1]], G=[[1]]))
+    array([0.+0.j])
+    """
+    require_regular(model)
+    blocks = [
+        np.block([[P, -B], [F, D]])
+        for P, B, F, D in (
+            (model.K, model.B, model.F, model.D),
+            (model.C, model.Bv, model.G, model.Dv),
+            (model.M, model.Ba, model.H, model.Da),
+        )
+    ]
+    part, scale = _quadratic_pencil(blocks)
+    return _sorted(part.eigenvalues * scale)
+
+
+def require_regular(model: SecondOrderModel) -> None:
+    """Refuse a singular pencil, naming the DOFs that nothing holds.
+
+    Raises
+    ------
+    SingularPencilError
+        ``P(s)`` is singular to working precision at three generic points.
+    """
+    gamma = _time_scale((model.K, model.C, model.M))
+    for point in GENERIC_POINTS:
+        s = gamma * point
+        P = model.K + s * model.C + s**2 * model.M
+        rows, columns = equilibrating_powers(np.abs(P))
+        _, values, right = scipy.linalg.svd(P * rows[:, None] * columns)
+        if values[-1] > RANK_TOLERANCE * values.size * values[0]:
+            return
+    null = np.abs(right[-1])
+    dofs = tuple([model.dofs[index] for index in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
+    msg = (
+        f"The pencil is singular: det P(s) vanishes at every s (smallest singular value {values[-1]:.1e} of "
+        f"{values[0]:.1e} after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node without "
+        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is "
+        "redundant or give it a stiffness."
+    )
+    raise SingularPencilError(msg, dofs=dofs)
+
+
+def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float]:
+    """Deflate the pencil (8) of ``R_0 + R_1 s + R_2 s^2``; its eigenvalues are in units of the scale given back."""
+    R0, R1, R2 = _equilibrated(coefficients)
+    scale = _time_scale((R0, R1, R2))
+    R1, R2 = R1 * scale, R2 * scale**2
+    left, values, right = scipy.linalg.svd(R2, full_matrices=False)
+    rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(R2.shape) * values[0])) if values.size else 0
+    left, right = _without_specks(left[:, :rank] * values[:rank]), _without_specks(right[:rank])
+    corner = np.zeros((rank, rank))
+    E = np.block([[R1, left], [right, corner]])
+    A = np.block([[-R0, np.zeros_like(left)], [np.zeros_like(right), np.eye(rank)]])
+    return finite_part(A, E), scale
+
+
+def _without_specks(vectors: Matrix) -> Matrix:
+    """Set entries to zero that are rounding in vectors of length about one."""
+    return np.where(np.abs(vectors) <= 4 * np.finfo(float).eps, 0.0, vectors)
+
+
+def _equilibrated(coefficients: Sequence[Matrix]) -> tuple[Matrix, Matrix, Matrix]:
+    """Scale rows and columns so that the highest coefficient there is in each is near one."""
+    R0, R1, R2 = coefficients
+    rows, columns = equilibrating_powers(np.abs(R2))
+    for lower in (R1, R0):
+        size = np.abs(lower) * rows[:, None] * columns
+        empty_rows, empty_columns = ~R2.any(axis=1), ~R2.any(axis=0)
+        rows = np.where(empty_rows, rows * powers_of_two(size.max(axis=1, initial=0.0)), rows)
+        size = np.abs(lower) * rows[:, None] * columns
+        columns = np.where(empty_columns, columns * powers_of_two(size.max(axis=0, initial=0.0)), columns)
+    scale = rows[:, None] * columns
+    return R0 * scale, R1 * scale, R2 * scale
+
+
+def _time_scale(coefficients: Sequence[Matrix]) -> float:
+    """Give the power of two nearest to sqrt(|R_0| / |R_2|), or the like for the coefficients there are."""
+    sizes = [float(np.abs(matrix).max(initial=0.0)) for matrix in coefficients]
+    present = [power for power, size in enumerate(sizes) if size > 0.0]
+    if len(present) < 2:  # noqa: PLR2004
+        return 1.0
+    low, high = present[0], present[-1]
+    return float(2.0 ** np.round(np.log2(sizes[low] / sizes[high]) / (high - low)))
+
+
+def _sorted(values: ComplexArray) -> ComplexArray:
+    """Sort by size, conjugate pairs with the positive imaginary part first."""
+    return values[np.lexsort((-values.imag, values.real, np.abs(values).round(12)))]

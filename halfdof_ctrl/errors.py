@@ -1,0 +1,132 @@
+"""What the package raises: one base class, a few children, numbers and names as attributes.
+
+A message states the measured fact, the DOF or signal by name, what it means physically and what to do.
+The attributes repeat the facts for programs.
+"""
+
+from collections.abc import Callable
+
+
+def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
+    """Make an error again on the other side of a process boundary."""
+    error = kind.__new__(kind)
+    ValueError.__init__(error, message)
+    error.__dict__.update(facts)
+    return error
+
+
+class HalfdofError(ValueError):
+    """Base of every refusal of this package."""
+
+    def __reduce__(self) -> tuple[Callable[..., "HalfdofError"], tuple[object, ...]]:
+        """Pickle by message and facts, since children take keyword-only arguments."""
+        return _rebuild, (type(self), str(self), self.__dict__)
+
+
+class MatrixError(HalfdofError):
+    """A matrix cannot be used: shape, kind of entry, NaN or Inf; `matrix` is its letter."""
+
+    def __init__(self, message: str, *, matrix: str) -> None:
+        super().__init__(message)
+        self.matrix = matrix
+
+
+class ComplexModelError(HalfdofError):
+    """A real state space was asked for a complex model; `matrices` are the complex ones."""
+
+    def __init__(self, message: str, *, matrices: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.matrices = matrices
+
+
+class SignalNameError(HalfdofError):
+    """Names of DOFs or signals clash, are unknown or cannot be used; `names` are the culprits."""
+
+    def __init__(self, message: str, *, names: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.names = names
+
+
+class ParameterError(HalfdofError):
+    """A parameter is outside its physical range; `parameter` and `value` say which."""
+
+    def __init__(self, message: str, *, parameter: str, value: object) -> None:
+        super().__init__(message)
+        self.parameter = parameter
+        self.value = value
+
+
+class SingularLeadingMatrixError(HalfdofError):
+    """The leading matrix W of equation (2) is singular.
+
+    `dofs` take part in its null vector, `rcond` is the reciprocal condition number after scaling.
+    """
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...], rcond: float) -> None:
+        super().__init__(message)
+        self.dofs = dofs
+        self.rcond = rcond
+
+
+class SingularPencilError(HalfdofError):
+    """``det P(s)`` vanishes identically: `dofs` can move in any way without a force."""
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.dofs = dofs
+
+
+class ImproperError(HalfdofError):
+    """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
+
+    def __init__(self, message: str, *, pairs: tuple[tuple[str, str, int], ...]) -> None:
+        super().__init__(message)
+        self.pairs = pairs
+
+
+class InconsistentStateError(HalfdofError):
+    """Initial values contradict the equations without inertia.
+
+    `names` are the displacements and velocities concerned, `given` and `required` their values.
+    """
+
+    def __init__(
+        self, message: str, *, names: tuple[str, ...], given: tuple[float, ...], required: tuple[float, ...]
+    ) -> None:
+        super().__init__(message)
+        self.names = names
+        self.given = given
+        self.required = required
+
+
+class WeightError(HalfdofError):
+    """Weights of a quadratic cost do not define a regulator problem; `names` are the quantities."""
+
+    def __init__(self, message: str, *, names: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.names = names
+
+
+class StabilizationError(HalfdofError):
+    """No stabilizing feedback came out.
+
+    `eigenvalue` [rad/s] is the mode left on or right of the imaginary axis, `quantity` the physical
+    quantity in which it is seen most.
+    """
+
+    def __init__(self, message: str, *, eigenvalue: complex, quantity: str) -> None:
+        super().__init__(message)
+        self.eigenvalue = eigenvalue
+        self.quantity = quantity
+
+
+class FileFormatError(HalfdofError):
+    """A file cannot be read as a model, or its ending names no known format; `path` is the file."""
+
+    def __init__(self, message: str, *, path: str) -> None:
+        super().__init__(message)
+        self.path = path
+
+
+class NearlyMasslessWarning(UserWarning):
+    """A DOF has a mass so small against the others that its two states cost digits."""

@@ -1,0 +1,82 @@
+"""Evaluate equation (1), ``F(s) P(s)^-1 B(s) + D(s)``, by a direct solve at each point.
+
+Each ``P(s)`` is equilibrated by powers of two (which rounds nothing), factorized with partial pivoting,
+and its solution is corrected once where the componentwise backward error is above rounding.
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+
+Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
+
+BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
+BACKWARD_ERROR = 64 * np.finfo(float).eps  #: componentwise; above it a solution is corrected once
+
+
+def quadratic_transfer(
+    P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray
+) -> ComplexArray:
+    """Evaluate ``F(s) P(s)^-1 B(s) + D(s)`` at every point.
+
+    Parameters
+    ----------
+    P, B, F, D : sequences of (n, n), (n, m), (p, n), (p, m) ndarrays
+        Coefficients of 1, s, s^2.
+    points : (k,) complex ndarray
+        Where to evaluate [rad/s].
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+        ``inf + nan j`` in every entry where ``P(s)`` is exactly singular.
+    """
+    values = np.empty((*D[0].shape, points.size), dtype=np.complex128)
+    batch = max(1, BATCH_ENTRIES // P[0].size)
+    for start in range(0, points.size, batch):
+        part = points[start : start + batch]
+        states = _solved(_polynomial(P, part), _polynomial(B, part))
+        values[:, :, start : start + batch] = np.moveaxis(_polynomial(F, part) @ states + _polynomial(D, part), 0, 2)
+    return values
+
+
+def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArray:
+    """Stack the values of a matrix polynomial, (k, rows, columns), skipping zero coefficients."""
+    values = np.zeros((points.size, *coefficients[0].shape), dtype=np.complex128)
+    for power, coefficient in enumerate(coefficients):
+        if coefficient.any():
+            values += (points**power)[:, None, None] * coefficient
+    return values
+
+
+def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
+    """Solve ``P x = B`` for a stack of matrices, equilibrated."""
+    rows = _power_of_two_below(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
+    columns = _power_of_two_below(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
+    scaled, right = P * rows * columns, B * rows
+    solution = _solve_each(scaled, right)
+    with np.errstate(invalid="ignore", over="ignore"):
+        residual = right - scaled @ solution
+        size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
+        coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
+    if coarse.any():
+        solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
+    return np.swapaxes(columns, 1, 2) * solution
+
+
+def _solve_each(P: ComplexArray, B: ComplexArray) -> ComplexArray:
+    try:
+        return np.linalg.solve(P, B)
+    except np.linalg.LinAlgError:  # one of the stack is exactly singular: that one is infinite
+        if P.shape[0] == 1:
+            return np.full(B.shape, complex(np.inf, np.nan))
+        half = P.shape[0] // 2
+        return np.concatenate([_solve_each(P[:half], B[:half]), _solve_each(P[half:], B[half:])])
+
+
+def _power_of_two_below(size: FloatArray) -> FloatArray:
+    """Powers of two that bring the sizes to between 1/2 and 1 (1 for a zero)."""
+    return np.ldexp(1.0, -np.frexp(size)[1])

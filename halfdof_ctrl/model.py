@@ -1,0 +1,406 @@
+"""The mechanical model: four quadratic matrix polynomials and the names of their signals.
+
+    P(s) q = B(s) u,    y = F(s) q + D(s) u,    H(s) = F(s) P(s)^-1 B(s) + D(s)          (1)
+
+    P(s) = K + C s + M s^2        B(s) = B + Bv s + Ba s^2
+    F(s) = F + G s + H s^2        D(s) = D + Dv s + Da s^2
+
+The letters are those of MATLAB's `mechss`. `mechss` is the one door through which models come in; what
+it has checked is not checked again. Derivation of all that follows: docs/explanation/reduction.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.arrays import ComplexArray, Matrix, checked_matrix, is_complex, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.errors import MatrixError, SignalNameError
+from halfdof_ctrl.evaluation import quadratic_transfer
+from halfdof_ctrl.names import (
+    checked_dofs,
+    checked_names,
+    force_names,
+    listed,
+    motion_names,
+    motions,
+    unknown_name_error,
+)
+
+Names: TypeAlias = str | Sequence[str] | None
+
+MATRIX_DIMENSIONS = 2
+LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
+LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class SecondOrderModel:
+    """``M q'' + C q' + K q = B u``, ``y = F q + G q' + H q'' + D u`` with named signals.
+
+    Made by `mechss`, not directly. For n DOFs, m inputs and p outputs; all arrays are read-only. Units
+    are those of the user; with SI units and forces as inputs they read as given here.
+    """
+
+    M: Matrix  #: (n, n) mass [kg]
+    C: Matrix  #: (n, n) damping [N s/m]
+    K: Matrix  #: (n, n) stiffness [N/m]
+    B: Matrix  #: (n, m) what an input does to the equations [N per unit of input]
+    Bv: Matrix  #: (n, m) the same for its first derivative
+    Ba: Matrix  #: (n, m) the same for its second derivative
+    F: Matrix  #: (p, n) displacements in the outputs
+    G: Matrix  #: (p, n) velocities in the outputs
+    H: Matrix  #: (p, n) accelerations in the outputs
+    D: Matrix  #: (p, m) direct term
+    Dv: Matrix  #: (p, m) the same for the first derivative of the inputs
+    Da: Matrix  #: (p, m) the same for the second derivative of the inputs
+    dofs: tuple[str, ...]  #: names of the n DOFs
+    inputs: tuple[str, ...]  #: names of the m inputs
+    outputs: tuple[str, ...]  #: names of the p outputs
+    name: str | None = None  #: name of the model, which the state space takes over
+
+    @property
+    def is_complex(self) -> bool:
+        """Whether any matrix has imaginary parts (structural damping)."""
+        return bool(self.complex_matrices)
+
+    @property
+    def complex_matrices(self) -> tuple[str, ...]:
+        """Letters of the complex matrices."""
+        return tuple([letter for letter in LETTERS if is_complex(getattr(self, letter))])
+
+    def __call__(self, s: npt.ArrayLike, squeeze: bool | None = None) -> ComplexArray:
+        """Transfer function H(s) of equation (1) by a direct solve at each `s`.
+
+        Parameters
+        ----------
+        s : complex or 1D array_like of complex
+            Points in the complex plane [rad/s].
+        squeeze : bool, optional
+            As in `control.StateSpace.__call__`: by default a single-input single-output model gives
+            a scalar or 1D array; False keeps (p, m, len(s)), True drops every axis of length one.
+
+        Returns
+        -------
+        complex ndarray
+            (p, m) for a scalar `s`, (p, m, len(s)) for an array, less the axes that `squeeze` drops.
+            ``inf + nan j`` where P(s) is exactly singular, as python-control has it.
+
+        Examples
+        --------
+        A spring of 4 N/m under 2 N gives 0.5 m:
+
+        >>> complex(mechss([[1]], [[0]], [[4]], [[2]])(0))
+        (0.5+0j)
+        """
+        points = np.asarray(s, dtype=np.complex128)
+        if points.ndim > 1:
+            msg = f"s must be a number or a 1D array, but it has {points.ndim} dimensions."
+            raise ValueError(msg)
+        values = quadratic_transfer(
+            (self.K, self.C, self.M),
+            (self.B, self.Bv, self.Ba),
+            (self.F, self.G, self.H),
+            (self.D, self.Dv, self.Da),
+            points.reshape(-1),
+        )
+        return _squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)
+
+    def select(self, inputs: Names = None, outputs: Names = None) -> "SecondOrderModel":
+        """Give the model with other inputs and outputs, picked by name.
+
+        Parameters
+        ----------
+        inputs : str or sequence of str, optional
+            Inputs of this model, or ``F_<dof>``, the unit force on any DOF. All inputs by default.
+        outputs : str or sequence of str, optional
+            Outputs of this model, or ``<dof>``, ``<dof>_dot``, ``<dof>_ddot``: displacement,
+            velocity or acceleration of any DOF. All outputs by default.
+
+        Raises
+        ------
+        SignalNameError
+            A name that is neither, or one that stands twice.
+        """
+        model = self if inputs is None else _with_inputs(self, inputs)
+        return model if outputs is None else _with_outputs(model, outputs)
+
+    def __repr__(self) -> str:
+        """Give the model on four lines: what it is called, how its DOFs split, its signals."""
+        title = f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
+        complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
+        return (
+            f"{title}: {len(self.dofs)} DOFs: {_split_in_words(self.M, self.C, self.K)}\n"
+            f"  dofs:    {listed(self.dofs)}\n"
+            f"  inputs:  {listed(self.inputs)}\n"
+            f"  outputs: {listed(self.outputs)}{complex_part}"
+        )
+
+
+def mechss(
+    M: npt.ArrayLike | None,
+    C: npt.ArrayLike | None,
+    K: npt.ArrayLike | None,
+    B: npt.ArrayLike | None = None,
+    F: npt.ArrayLike | None = None,
+    G: npt.ArrayLike | None = None,
+    *,
+    H: npt.ArrayLike | None = None,
+    D: npt.ArrayLike | None = None,
+    Bv: npt.ArrayLike | None = None,
+    Ba: npt.ArrayLike | None = None,
+    Dv: npt.ArrayLike | None = None,
+    Da: npt.ArrayLike | None = None,
+    dofs: Names = None,
+    inputs: Names = None,
+    outputs: Names = None,
+    name: str | None = None,
+) -> SecondOrderModel:
+    """Create a mechanical model from mass, damping and stiffness.
+
+    Parameters
+    ----------
+    M, C, K : (n, n) array_like or None
+        Mass [kg], damping [N s/m] and stiffness [N/m]; None for a matrix of zeros, but not all three.
+        They may be singular, unsymmetric or complex (structural damping).
+    B : (n, m) array_like, optional
+        Forces per input [N]; by default a unit force on every DOF, named ``F_<dof>``. A 1D array of
+        length n is one input.
+    F, G, H : (p, n) array_like, optional
+        Displacements, velocities and accelerations in the outputs; without any of them every
+        displacement is an output. A 1D array of length n is one output.
+    D : (p, m) array_like or 0, optional
+        Direct term from the inputs to the outputs.
+    Bv, Ba : (n, m) array_like, optional
+        Forces per first and second derivative of the inputs.
+    Dv, Da : (p, m) array_like, optional
+        Direct terms of the first and second derivative of the inputs.
+    dofs, inputs, outputs : str or sequence of str, optional
+        Names. By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
+        motion ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``, and any other signal ``u[0]``, ``y[0]``, ...
+    name : str, optional
+        Name of the model.
+
+    Returns
+    -------
+    SecondOrderModel
+
+    Raises
+    ------
+    MatrixError
+        A matrix of wrong shape, empty, of things that are no numbers, with NaN or Inf.
+    SignalNameError
+        Names that are too many or too few, twice the same, or that name a DOF's force or motion
+        while the matrices say something else.
+
+    Examples
+    --------
+    A mass of 2 kg on a spring, the spring's far end held by a damper alone:
+
+    >>> model = mechss([[2, 0], [0, 0]], [[0, 0], [0, 5]], [[8, -8], [-8, 8]], dofs=["mass", "joint"])
+    >>> model
+    SecondOrderModel: 2 DOFs: 1 inertial, 1 half, 0 static; 3 states
+      dofs:    mass, joint
+      inputs:  F_mass, F_joint
+      outputs: mass, joint
+    """
+    M, C, K = _square_matrices(M, C, K)
+    n = M.shape[0]
+    names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
+    m = _signals((B, Bv, Ba), axis=1, default=n)
+    p = _signals((F, G, H), axis=0, default=n)
+    every_force = B is None and Bv is None and Ba is None
+    every_displacement = F is None and G is None and H is None
+    input_columns = (
+        unit_matrix(n) if every_force else _checked_or_zero(B, "B", n, m),
+        _checked_or_zero(Bv, "Bv", n, m),
+        _checked_or_zero(Ba, "Ba", n, m),
+    )
+    output_rows = (
+        unit_matrix(n) if every_displacement else _checked_or_zero(F, "F", p, n),
+        _checked_or_zero(G, "G", p, n),
+        _checked_or_zero(H, "H", p, n),
+    )
+    direct = (_checked_or_zero(D, "D", p, m), _checked_or_zero(Dv, "Dv", p, m), _checked_or_zero(Da, "Da", p, m))
+    plain_inputs = every_force and inputs is None
+    plain_outputs = every_displacement and outputs is None and D is None and Dv is None and Da is None
+    return SecondOrderModel(
+        M=M,
+        C=C,
+        K=K,
+        B=input_columns[0],
+        Bv=input_columns[1],
+        Ba=input_columns[2],
+        F=output_rows[0],
+        G=output_rows[1],
+        H=output_rows[2],
+        D=direct[0],
+        Dv=direct[1],
+        Da=direct[2],
+        dofs=names,
+        inputs=force_names(names) if plain_inputs else _input_names(inputs, input_columns, names),
+        outputs=names if plain_outputs else _output_names(outputs, output_rows, direct, names),
+        name=name,
+    )
+
+
+def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Tell which columns of M are not null, and which of the others have a column in C that is not."""
+    inertial = M.any(axis=0)
+    return inertial, C.any(axis=0) & ~inertial
+
+
+def _square_matrices(*given: object) -> tuple[Matrix, Matrix, Matrix]:
+    """Check M, C and K against each other; None becomes zeros."""
+    size: tuple[int, int] | None = None
+    checked: list[Matrix | None] = []
+    for letter, matrix in zip("MCK", given, strict=True):
+        checked.append(None if matrix is None else checked_matrix(matrix, letter, size))
+        if size is None and checked[-1] is not None:
+            size = checked[-1].shape
+    if size is None:
+        msg = "M, C and K are all None: a model needs at least one of them."
+        raise MatrixError(msg, matrix="K")
+    M, C, K = (zero_matrix(*size) if matrix is None else matrix for matrix in checked)
+    return M, C, K
+
+
+def _signals(given: Sequence[object], axis: int, default: int) -> int:
+    """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
+    for value in given:
+        if value is not None:
+            shape = np.shape(value)  # type: ignore[arg-type]
+            return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
+    return default
+
+
+def _checked_or_zero(value: object, letter: str, rows: int, columns: int) -> Matrix:
+    if value is None or (isinstance(value, int | float) and value == 0):
+        return zero_matrix(rows, columns)
+    return checked_matrix(value, letter, (rows, columns))
+
+
+def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the inputs; a column that is a unit force on a DOF and the name ``F_<dof>`` belong together."""
+    forces = force_names(dofs)
+    meaning = [_unit_vectors([matrix[:, j] for matrix in columns]) for j in range(columns[0].shape[1])]
+    found = [forces[hit[1]] if hit is not None and hit[0] == 0 else None for hit in meaning]
+    return _reconciled(given, found, forces, ("inputs", "u", "the unit force on a DOF", "B"))
+
+
+def _output_names(
+    given: Names, rows: Sequence[Matrix], direct: Sequence[Matrix], dofs: tuple[str, ...]
+) -> tuple[str, ...]:
+    """Name the outputs; a row that is a DOF's motion and the motion's name belong together."""
+    names = [motion_names(dofs, derivative) for derivative in range(len(rows))]
+    found: list[str | None] = []
+    for i in range(rows[0].shape[0]):
+        hit = _unit_vectors([matrix[i] for matrix in rows])
+        fed = any(matrix[i].any() for matrix in direct)
+        found.append(None if hit is None or fed else names[hit[0]][hit[1]])
+    return _reconciled(given, found, tuple(motions(dofs)), ("outputs", "y", "a DOF's motion", "F, G, H"))
+
+
+def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
+    """Find (which vector, which entry) if all entries are zero but a single one that is 1."""
+    places = [(which, int(entry)) for which, vector in enumerate(vectors) for entry in np.flatnonzero(vector)]
+    if len(places) == 1 and vectors[places[0][0]][places[0][1]] == 1:
+        return places[0]
+    return None
+
+
+def _reconciled(
+    given: Names, found: Sequence[str | None], physical: tuple[str, ...], words: tuple[str, str, str, str]
+) -> tuple[str, ...]:
+    """Take the given names, or the found ones, and refuse a physical name on another signal."""
+    what, letter, meaning, matrices = words
+    if given is None:
+        physical_found = [name for name in found if name is not None]
+        once = len(set(physical_found)) == len(physical_found)
+        return tuple([name if name and once else f"{letter}[{i}]" for i, name in enumerate(found)])
+    names = checked_names(given, len(found), what)
+    reserved = set(physical)
+    wrong = tuple(
+        [name for name, by_matrix in zip(names, found, strict=True) if name in reserved and name != by_matrix]
+    )
+    if wrong:
+        msg = (
+            f"Among the {what}, {listed(wrong)} is the name of {meaning}, but {matrices} say something else. "
+            "Rename it, or take the physical signal by select()."
+        )
+        raise SignalNameError(msg, names=wrong)
+    return names
+
+
+def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
+    picked = _picked(names, model.inputs, force_names(model.dofs), "input")
+    unit, no_force, no_feed = unit_matrix(model.M.shape[0]), zero_matrix(*model.M.shape), zero_matrix(*model.F.shape)
+    return replace(
+        model,
+        inputs=_as_tuple(names),
+        B=read_only(np.hstack([model.B, unit])[:, picked]),
+        Bv=read_only(np.hstack([model.Bv, no_force])[:, picked]),
+        Ba=read_only(np.hstack([model.Ba, no_force])[:, picked]),
+        D=read_only(np.hstack([model.D, no_feed])[:, picked]),
+        Dv=read_only(np.hstack([model.Dv, no_feed])[:, picked]),
+        Da=read_only(np.hstack([model.Da, no_feed])[:, picked]),
+    )
+
+
+def _with_outputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
+    picked = _picked(names, model.outputs, tuple(motions(model.dofs)), "output")
+    n, m = model.M.shape[0], model.B.shape[1]
+    unit, no_motion, no_feed = unit_matrix(n), zero_matrix(n, n), zero_matrix(3 * n, m)
+    return replace(
+        model,
+        outputs=_as_tuple(names),
+        F=read_only(np.vstack([model.F, unit, no_motion, no_motion])[picked]),
+        G=read_only(np.vstack([model.G, no_motion, unit, no_motion])[picked]),
+        H=read_only(np.vstack([model.H, no_motion, no_motion, unit])[picked]),
+        D=read_only(np.vstack([model.D, no_feed])[picked]),
+        Dv=read_only(np.vstack([model.Dv, no_feed])[picked]),
+        Da=read_only(np.vstack([model.Da, no_feed])[picked]),
+    )
+
+
+def _as_tuple(names: Names) -> tuple[str, ...]:
+    return (names,) if isinstance(names, str) else tuple(names or ())
+
+
+def _picked(names: Names, own: tuple[str, ...], physical: tuple[str, ...], what: str) -> list[int]:
+    """Give the positions of names in the model's own signals followed by the physical ones."""
+    wanted = _as_tuple(names)
+    if not wanted:
+        msg = f"No {what} is selected: a model needs at least one."
+        raise SignalNameError(msg, names=())
+    checked_names(wanted, len(wanted), f"{what}s")
+    places = {name: len(own) + index for index, name in enumerate(physical)}
+    places.update({name: index for index, name in enumerate(own)})
+    for name in wanted:
+        if name not in places:
+            raise unknown_name_error(name, what, dict.fromkeys((*own, *physical)))
+    return [places[name] for name in wanted]
+
+
+def _squeezed(values: ComplexArray, *, scalar: bool, squeeze: bool | None) -> ComplexArray:
+    """Drop axes of a (p, m, k) response as python-control does."""
+    if squeeze is None:
+        squeeze = values.shape[:2] == (1, 1)
+        values = values[0, 0] if squeeze else values
+        return values[..., 0] if scalar else values
+    values = values[..., 0] if scalar else values
+    return values.squeeze() if squeeze else values
+
+
+def _split_in_words(M: Matrix, C: Matrix, K: Matrix) -> str:
+    """Say how many DOFs are inertial, half and static, and the states that follow."""
+    inertial, half = null_column_kinds(M, C)
+    n, n_inertial, n_half = M.shape[0], int(inertial.sum()), int(half.sum())
+    kinds = f"{n_inertial} inertial, {n_half} half, {n - n_inertial - n_half} static"
+    leading = np.where(inertial, M, np.where(half, C, K))
+    size = np.abs(leading).max(axis=0)
+    if n <= LARGEST_RANKED_REPR and (not size.all() or np.linalg.matrix_rank(leading / size) < n):
+        return f"{kinds} by null columns, which do not suffice here (see exact_reduction)"
+    return f"{kinds}; {2 * n_inertial + n_half} states"

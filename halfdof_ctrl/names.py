@@ -1,0 +1,122 @@
+"""Names of degrees of freedom (DOFs) and signals, and their way into python-control and back.
+
+For a DOF ``y`` the package knows the force ``F_y`` and the displacement, velocity and acceleration
+``y``, ``y_dot``, ``y_ddot``. python-control forbids the full stop in labels, which finite-element
+labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
+"""
+
+from collections.abc import Iterable, Sequence
+from itertools import chain
+
+from halfdof_ctrl.errors import SignalNameError
+
+DERIVATIVE_SUFFIXES = ("", "_dot", "_ddot")
+FORCE_PREFIX = "F_"
+
+
+def control_label(name: str) -> str:
+    """Write a name as a label that python-control takes; `name_from_label` is the exact inverse.
+
+    >>> control_label("101.1")
+    '101:1'
+    """
+    if "." in name or ":" in name or "%" in name:
+        return name.replace("%", "%25").replace(":", "%3A").replace(".", ":")
+    return name
+
+
+def name_from_label(label: str) -> str:
+    """Give the model's name behind a label of `control_label`.
+
+    >>> name_from_label("101:1")
+    '101.1'
+    """
+    return label.replace(":", ".").replace("%3A", ":").replace("%25", "%")
+
+
+def motion_names(dofs: Iterable[str], derivative: int) -> tuple[str, ...]:
+    """Names of the displacements (0), velocities (1) or accelerations (2) of the DOFs."""
+    suffix = DERIVATIVE_SUFFIXES[derivative]
+    return tuple([dof + suffix for dof in dofs])
+
+
+def force_names(dofs: Iterable[str]) -> tuple[str, ...]:
+    """Names of the unit forces on the DOFs."""
+    return tuple([FORCE_PREFIX + dof for dof in dofs])
+
+
+def motions(dofs: Sequence[str]) -> dict[str, tuple[int, int]]:
+    """Map every displacement, velocity and acceleration to (position of the DOF, derivative)."""
+    return {
+        name: (index, derivative)
+        for derivative in range(len(DERIVATIVE_SUFFIXES))
+        for index, name in enumerate(motion_names(dofs, derivative))
+    }
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """Join names for a message, cutting a long list short."""
+    shown = ", ".join(names[:most])
+    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[str, ...]:
+    """Check a list of names: as many as there are signals, non-empty strings, no two the same.
+
+    Raises
+    ------
+    SignalNameError
+        Wrong count, entries that are not text, or duplicates, which python-control would merge
+        silently into one signal.
+    """
+    names = (given,) if isinstance(given, str) else tuple(given)
+    if len(names) != count:
+        msg = (
+            f"{len(names)} names were given for {count} {what}: {listed([str(name) for name in names])}. Name each one."
+        )
+        raise SignalNameError(msg, names=tuple(str(name) for name in names))
+    if not all(isinstance(name, str) and name.strip() == name and name for name in names):
+        bad = [repr(name) for name in names if not (isinstance(name, str) and name.strip() == name and name)]
+        msg = f"Names of {what} must be non-empty text without blanks at the ends, not {listed(bad)}."
+        raise SignalNameError(msg, names=tuple(bad))
+    if len(set(names)) != count:
+        twice = _duplicates(names)
+        msg = f"Names of {what} must differ, but {listed(twice)} stands more than once. Rename all but one."
+        raise SignalNameError(msg, names=twice)
+    return names
+
+
+def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
+    """Check the names of the DOFs, and that their velocities and accelerations have names of their own.
+
+    Raises
+    ------
+    SignalNameError
+        As `checked_names`, or a DOF is named like the velocity or acceleration of another.
+    """
+    dofs = checked_names(given, count, "DOFs")
+    every = tuple(chain.from_iterable(motion_names(dofs, derivative) for derivative in range(3)))
+    if len(set(every)) != len(every):
+        clash = _duplicates(every)
+        msg = (
+            f"{listed(clash)} would name both a DOF's motion and a derivative of another DOF's motion, "
+            "since the velocity of y is called y_dot and its acceleration y_ddot. Rename one of the DOFs."
+        )
+        raise SignalNameError(msg, names=clash)
+    return dofs
+
+
+def unknown_name_error(name: str, what: str, known: Iterable[str]) -> SignalNameError:
+    """Make the refusal of a name that is not in the model, with the ones that are."""
+    msg = f"The model has no {what} {name!r}. Known: {listed(list(known), most=24)}."
+    return SignalNameError(msg, names=(name,))
+
+
+def _duplicates(names: Iterable[str]) -> tuple[str, ...]:
+    seen: set[str] = set()
+    twice: dict[str, None] = {}
+    for name in names:
+        if name in seen:
+            twice[name] = None
+        seen.add(name)
+    return tuple(twice)

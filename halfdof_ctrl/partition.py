@@ -1,0 +1,293 @@
+"""Split the DOFs into inertial, half and static ones: the bases T_i, T_c, T_k of equation (2).
+
+    q = T_i p_i + T_c p_c + T_k p_k,    M [T_c T_k] = 0,    C T_k = 0                    (2a)
+    W = [ M T_i   C T_c   K T_k ]                                                          (2)
+
+`select_columns` takes T as a selection of the DOFs: null columns of M are half or static, of these the
+null columns of C static (Simionatto and others, section 2). `orthonormal_bases` serves models whose mass
+is rank deficient without null columns: null(M) and null(M) with null(C) are found block by block, in the
+connected components of the pattern of M and then of C, on equilibrated blocks. Every coordinate that
+needs no mixing stays the DOF that it was. Derivation: docs/explanation/reduction.md.
+"""
+
+import warnings
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix
+from halfdof_ctrl.errors import NearlyMasslessWarning
+from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
+from halfdof_ctrl.names import listed
+from halfdof_ctrl.scaling import equilibrating_factors
+
+IndexArray: TypeAlias = npt.NDArray[np.intp]
+
+RANK_TOLERANCE = 16 * np.finfo(float).eps  #: times the block's size; singular values below are null
+CANCELLATION = 16 * np.finfo(float).eps  #: times n: entries of C N below this part of their terms' size are zero
+NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
+PLAIN_SPREAD = 1e5  #: of mass and of stiffness over mass; a smaller one needs no closer look
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RankDecision:
+    """The singular values by which one block of a matrix was split."""
+
+    matrix: Literal["M", "C"]  #: which null space was looked for
+    dofs: tuple[str, ...]  #: the DOFs of the block
+    singular_values: FloatArray  #: of the equilibrated block, falling
+    rank: int  #: how many of them count
+
+    @property
+    def gap(self) -> float:
+        """Smallest singular value that counts over the largest that does not (inf if none)."""
+        values = self.singular_values
+        if self.rank == 0 or self.rank == values.size or values[self.rank] == 0.0:
+            return float("inf")
+        return float(values[self.rank - 1] / values[self.rank])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class DofPartition:
+    """Coordinates p = (p_i, p_c, p_k) of q = T p, equation (2a), for n DOFs."""
+
+    method: Literal["selection", "orthogonal"]
+    order: IndexArray  #: (n,) selection: the DOFs in the order inertial, half, static
+    basis: FloatArray | None  #: (n, n) T, or None where T is the selection by `order`
+    n_inertial: int
+    n_half: int
+    n_static: int
+    coordinates: tuple[str, ...]  #: names of p: DOFs, or mix0, mix1, ... for combinations
+    evidence: tuple[RankDecision, ...]  #: what the orthonormal bases rest on
+
+    @property
+    def inertial(self) -> tuple[str, ...]:
+        """Names of the coordinates with mass, p_i."""
+        return self.coordinates[: self.n_inertial]
+
+    @property
+    def half(self) -> tuple[str, ...]:
+        """Names of the damped coordinates without mass, p_c."""
+        return self.coordinates[self.n_inertial : self.n_inertial + self.n_half]
+
+    @property
+    def static(self) -> tuple[str, ...]:
+        """Names of the coordinates with neither, p_k."""
+        return self.coordinates[self.n_inertial + self.n_half :]
+
+    @property
+    def T(self) -> FloatArray:
+        """(n, n) transformation q = T p, its columns in the order inertial, half, static."""
+        return unit_matrix(self.order.size)[:, self.order] if self.basis is None else self.basis
+
+    def times_basis(self, matrix: Matrix, first: int, stop: int | None) -> FloatArray:
+        """Give the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns."""
+        if self.basis is None:
+            return matrix[:, self.order[first:stop]]
+        return matrix @ self.basis[:, first:stop]
+
+    def basis_times(self, coordinates: FloatArray) -> FloatArray:
+        """Give ``q = T p`` for an (n, k) array."""
+        if self.basis is not None:
+            return self.basis @ coordinates
+        displacements = np.empty_like(coordinates)
+        displacements[self.order] = coordinates
+        return displacements
+
+    def to_coordinates(self, displacements: FloatArray) -> FloatArray:
+        """Give ``p = T^-1 q`` for an (n, k) array."""
+        return displacements[self.order] if self.basis is None else np.linalg.solve(self.basis, displacements)
+
+
+def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
+    """Split the DOFs by the null columns of M and C.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        A real model.
+    tol : float, optional
+        A column of M counts as null where its scaled size is at most `tol` times the largest one. By
+        default only exact zeros count. The scale is unit-free: see `mass_ratios`.
+
+    Warns
+    -----
+    NearlyMasslessWarning
+        A mass is not zero but below 1e-10 of the others in scaled units.
+    """
+    inertial, half = null_column_kinds(model.M, model.C)
+    if tol is not None or _spread_is_wide(model, inertial):
+        inertial, half = _without_tiny_masses(model, inertial, 0.0 if tol is None else tol)
+    kind = np.where(inertial, 0, np.where(half, 1, 2))
+    order = np.argsort(kind, kind="stable")
+    n_inertial, n_half = int(np.count_nonzero(inertial)), int(np.count_nonzero(half))
+    names = model.dofs
+    return DofPartition(
+        method="selection",
+        order=order,
+        basis=None,
+        n_inertial=n_inertial,
+        n_half=n_half,
+        n_static=len(names) - n_inertial - n_half,
+        coordinates=tuple([names[index] for index in order.tolist()]),
+        evidence=(),
+    )
+
+
+def mass_ratios(model: SecondOrderModel) -> FloatArray:
+    """Give each DOF's mass relative to the largest, free of units.
+
+    Rows, columns and time are scaled until ``|K| + |C| + |M|`` is equilibrated and the scaled M and K
+    are of one size (H.-Y. Fan, W.-W. Lin, P. Van Dooren, Normwise scaling of second order polynomial
+    matrices, 2004); the ratio is between the largest entries of the columns of the scaled M.
+    """
+    size = [np.abs(matrix) for matrix in (model.M, model.C, model.K)]
+    gamma = 1.0
+    for _ in range(3):  # the scale of time follows from the scaled entries, and they from it
+        rows, columns = equilibrating_factors(size[0] * gamma**2 + size[1] * gamma + size[2])
+        mass = (size[0] * rows[:, None] * columns).max(axis=0)
+        stiffness = ((size[2] + size[1] * gamma) * rows[:, None] * columns).max()
+        gamma = float(np.sqrt(stiffness / mass.max())) if stiffness > 0.0 and mass.max() > 0.0 else 1.0
+    return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
+
+
+def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
+    """Split the motion into null(M) with null(C), the rest of null(M), and what is left.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        A real model.
+    tol : float, optional
+        Singular values of an equilibrated block at most `tol` times its largest count as zero; by
+        default 16 eps times the block's size.
+
+    Returns
+    -------
+    DofPartition
+        Within a block that needs mixing the columns of T are orthonormal up to the block's scaling by
+        powers of two; elsewhere they select DOFs.
+    """
+    massive, massless, first = _null_split("M", model.M, unit_matrix(len(model.dofs)), model.dofs, tol)
+    drag = _cancelled(model.C @ massless.columns, np.abs(model.C) @ massless.sizes)
+    half, still, second = _null_split("C", drag, massless.columns, model.dofs, tol)
+    static = still.columns
+    basis = np.hstack([massive, half, static])
+    return DofPartition(
+        method="orthogonal",
+        order=np.arange(basis.shape[0]),
+        basis=read_only(basis),
+        n_inertial=massive.shape[1],
+        n_half=half.shape[1],
+        n_static=static.shape[1],
+        coordinates=_coordinate_names(basis, model.dofs),
+        evidence=(*first, *second),
+    )
+
+
+def _spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:
+    """Tell cheaply whether some mass might be tiny against the others in some unit."""
+    if np.count_nonzero(inertial) <= 1:
+        return False
+    mass = np.abs(model.M).max(axis=0)[inertial]
+    stiffness = (np.abs(model.K) + np.abs(model.C)).max(axis=0)[inertial]
+    return bool(
+        mass.max() > PLAIN_SPREAD * mass.min() or (stiffness > PLAIN_SPREAD * mass / mass.max() * stiffness.min()).any()
+    )
+
+
+def _without_tiny_masses(
+    model: SecondOrderModel, inertial: npt.NDArray[np.bool_], tol: float
+) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+    """Take masses up to `tol` as none, and warn of those that are tiny and stay."""
+    ratio = mass_ratios(model)
+    inertial = inertial & (ratio > tol)
+    tiny = np.flatnonzero(inertial & (ratio < NEARLY_MASSLESS))
+    if tiny.size:
+        names = [model.dofs[index] for index in tiny.tolist()]
+        largest = float(ratio[tiny].max())
+        msg = (
+            f"DOFs {listed(names)} have a mass of at most {largest:.1e} of the largest (in scaled units), but not zero: "
+            f"their two states are far faster than the others and cost digits. If they are meant to be "
+            f"massless, set their mass to zero or pass tol={2.0 * largest:.0e}."
+        )
+        warnings.warn(msg, NearlyMasslessWarning, stacklevel=5)
+    return inertial, model.C.any(axis=0) & ~inertial
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _NullSpace:
+    columns: FloatArray  #: (n, d) basis
+    sizes: FloatArray  #: (n, d) what the rounding errors of its entries are relative to
+
+
+def _null_split(
+    letter: Literal["M", "C"], product: FloatArray, columns: FloatArray, dofs: tuple[str, ...], tol: float | None
+) -> tuple[FloatArray, _NullSpace, list[RankDecision]]:
+    """Split the span of `columns` (n, d) into a part where `product` (n, d) has full rank and its null space.
+
+    A mixed column is known to rounding of the largest entry that its DOF has in the block, times the spread
+    of the singular values that count; a column that is taken over is as exact as it was.
+    """
+    ranging, null, sizes, evidence = [columns[:, :0]], [columns[:, :0]], [columns[:, :0]], []
+    for block in _linked_columns(product):
+        part = product[:, block]
+        part = part[part.any(axis=1)]
+        if part.shape[0] == 0:
+            null.append(columns[:, block])
+            sizes.append(np.abs(columns[:, block]))
+            continue
+        row_factors, factors = equilibrating_factors(part)
+        _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
+        bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
+        rank = int(np.count_nonzero(values > bound * values[0]))
+        concerned = tuple([dofs[index] for index in np.flatnonzero(columns[:, block].any(axis=1)).tolist()])
+        evidence.append(RankDecision(matrix=letter, dofs=concerned, singular_values=values, rank=rank))
+        if rank == block.size:
+            ranging.append(columns[:, block])
+        else:
+            mixed = columns[:, block] @ (factors[:, None] * right.T)
+            ranging.append(mixed[:, :rank])
+            null.append(mixed[:, rank:])
+            size = np.abs(mixed).max(axis=1, keepdims=True) * (values[0] / values[rank - 1])
+            sizes.append(np.repeat(size, block.size - rank, axis=1))
+    return np.hstack(ranging), _NullSpace(np.hstack(null), np.hstack(sizes)), evidence
+
+
+def _linked_columns(product: FloatArray) -> list[IndexArray]:
+    """Group the columns that share nonzero rows, directly or through others."""
+    rows, columns = product.shape
+    i, j = np.nonzero(product)
+    links = csr_array((np.ones(i.size), (i, rows + j)), shape=(rows + columns, rows + columns))
+    _, label = connected_components(links, directed=False)
+    groups: dict[int, list[int]] = {}
+    for column, group in enumerate(label[rows:].tolist()):
+        groups.setdefault(group, []).append(column)
+    return [np.array(group) for group in groups.values()]
+
+
+def _cancelled(product: FloatArray, size: FloatArray) -> FloatArray:
+    """Set entries to zero that are rounding of a sum whose terms cancel; `size` adds up the terms."""
+    return np.where(np.abs(product) <= CANCELLATION * product.shape[0] * size, 0.0, product)
+
+
+def _coordinate_names(basis: FloatArray, dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Name a column of T by its DOF if it selects one, else mix0, mix1, ... (clear of the DOFs' names)."""
+    prefix = "mix"
+    while any(dof.startswith(prefix) for dof in dofs):
+        prefix += "_"
+    names: list[str] = []
+    mixtures = 0
+    for column in basis.T:
+        entries = np.flatnonzero(column)
+        if entries.size == 1 and column[entries[0]] == 1.0:
+            names.append(dofs[int(entries[0])])
+        else:
+            names.append(f"{prefix}{mixtures}")
+            mixtures += 1
+    return tuple(names)

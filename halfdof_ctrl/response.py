@@ -1,0 +1,157 @@
+"""Frequency responses: of the descriptor form by direct solves, of a state space fast and balanced.
+
+Both give `control.FrequencyResponseData`, so that python-control's plots and tools take them. Frequencies
+are always the points themselves: two of them are two points, not the limits of a range.
+"""
+
+import control
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.descriptor import pencil_structure, require_regular
+from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.hessenberg import state_space_response
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.names import control_label
+from halfdof_ctrl.statespace import mech2ss
+
+DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
+MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
+FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
+
+
+def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = None) -> control.FrequencyResponseData:
+    """Compute the frequency response of the descriptor form.
+
+    Equation (1) is solved directly at each frequency, without the reduction, also for complex and
+    improper models.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    omega : (k,) array_like, optional
+        Frequencies [rad/s], the very points; by default a grid around the finite eigenvalues.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        With the model's names.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+    ParameterError
+        Frequencies that are no finite, nonnegative numbers.
+
+    Examples
+    --------
+    >>> spring = mechss([[0]], [[0]], [[4]])
+    >>> descriptor_response(spring, [1.0, 2.0]).magnitude.tolist()
+    [0.25, 0.25]
+    """
+    require_regular(model)
+    if omega is None:
+        omega = default_frequencies(pencil_structure(model).finite_eigenvalues)
+    frequencies = checked_frequencies(omega)
+    values = model(1j * frequencies, squeeze=False)
+    return _data(values, frequencies, model.inputs, model.outputs, model.name)
+
+
+def frequency_response(
+    sysdata: control.StateSpace | SecondOrderModel, omega: npt.ArrayLike | None = None
+) -> control.FrequencyResponseData:
+    """Compute the frequency response of a state space or model, fast at any order.
+
+    Parameters
+    ----------
+    sysdata : control.StateSpace or SecondOrderModel
+        A model is reduced first; where no state space exists (complex, improper, or singular leading
+        matrix) its descriptor form is evaluated.
+    omega : (k,) array_like, optional
+        Frequencies [rad/s], the very points; by default a grid around the poles.
+
+    Returns
+    -------
+    control.FrequencyResponseData
+        ``inf + nan j`` at a pole.
+
+    Raises
+    ------
+    ParameterError
+        Frequencies that are no finite, nonnegative numbers.
+
+    Notes
+    -----
+    The states are balanced by powers of two and all points are worked side by side on a Hessenberg
+    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`.
+
+    Examples
+    --------
+    >>> lag = mech2ss([[0]], [[1]], [[2]])
+    >>> frequency_response(lag, [0.0]).complex.tolist()
+    [(0.5+0j)]
+    """
+    if isinstance(sysdata, SecondOrderModel):
+        try:
+            sys = mech2ss(sysdata)
+        except (ComplexModelError, ImproperError, SingularLeadingMatrixError):
+            return descriptor_response(sysdata, omega)
+    else:
+        sys = sysdata
+    frequencies = checked_frequencies(default_frequencies(sys.poles()) if omega is None else omega)
+    points = np.exp(1j * frequencies * float(sys.dt)) if sys.isdtime(strict=True) else 1j * frequencies
+    values = state_space_response(*(np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D)), points)
+    return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, sys.dt)
+
+
+def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> FloatArray:
+    """Choose frequencies [rad/s] that show every mode.
+
+    A logarithmic grid from a tenth of the slowest to ten times the fastest pole, and around each lightly
+    damped pole the frequencies that its peak needs.
+    """
+    size = np.abs(poles)
+    moving = poles[size > 1e-9 * size.max(initial=0.0)]
+    if moving.size == 0:
+        return np.geomspace(*FALLBACK_RANGE, points)
+    low, high = np.abs(moving).min() / MARGIN, np.abs(moving).max() * MARGIN
+    peaks = moving[(moving.imag > 0.0) & (np.abs(moving.real) < 0.05 * moving.imag)]
+    width = np.maximum(np.abs(peaks.real), 1e-6 * peaks.imag)
+    near = peaks.imag[:, None] + width[:, None] * np.linspace(-4.0, 4.0, 17)
+    near = near[(near > low) & (near < high)]
+    return np.unique(np.concatenate([np.geomspace(low, high, points), near]))
+
+
+def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
+    """Read frequencies as a 1D array of finite numbers that are not negative [rad/s]."""
+    try:
+        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
+    except (TypeError, ValueError) as cause:
+        msg = f"omega must be real numbers [rad/s]: {cause}."
+        raise ParameterError(msg, parameter="omega", value=omega) from cause
+    if frequencies.ndim != 1 or frequencies.size == 0 or not (np.isfinite(frequencies) & (frequencies >= 0.0)).all():
+        msg = "omega must be a list of one or more finite frequencies [rad/s], none of them negative."
+        raise ParameterError(msg, parameter="omega", value=omega)
+    return frequencies
+
+
+def _data(
+    values: ComplexArray,
+    frequencies: FloatArray,
+    inputs: tuple[str, ...] | list[str],
+    outputs: tuple[str, ...] | list[str],
+    name: str | None,
+    dt: float | bool | None = 0,
+) -> control.FrequencyResponseData:
+    labels = {} if name is None else {"name": control_label(name), "sysname": control_label(name)}
+    return control.FrequencyResponseData(
+        values,
+        frequencies,
+        dt,
+        inputs=[control_label(signal) for signal in inputs],
+        outputs=[control_label(signal) for signal in outputs],
+        plot_type="bode",
+        **labels,
+    )

@@ -1,0 +1,58 @@
+"""Equilibration by powers of two, for the reduction's rank decisions and factorizations.
+
+A unit changes a row or a column of a matrix by a factor. Decisions are therefore taken on the scaled
+matrix ``diag(r) X diag(c)``, whose largest entry in every nonzero row and column is near one; r and c
+are powers of two, which round nothing, so the scaling is undone exactly. (D. Ruiz, A scaling algorithm to
+equilibrate both rows and columns norms in matrices, 2001.)
+"""
+
+import numpy as np
+
+from halfdof_ctrl.arrays import FloatArray
+
+MOST_PASSES = 12  #: each pass halves the spread's exponent; 12 take it from 2^2000 to below 2
+EVEN = 2.0**10  #: rows and columns whose largest entries are between 1/1024 and 1024 are left as they are
+
+
+def equilibrating_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give powers of two r, c such that ``diag(r) matrix diag(c)`` has row and column maxima near one.
+
+    Parameters
+    ----------
+    matrix : (k, l) ndarray
+        Any real matrix; zero rows and columns are left alone.
+
+    Returns
+    -------
+    (k,) and (l,) ndarrays
+        Factors, all one where the maxima lie between 1/1024 and 1024 already.
+
+    Examples
+    --------
+    >>> equilibrating_factors(np.array([[65536.0, 0.0], [0.0, 0.5]]))
+    (array([0.00390625, 1.        ]), array([0.00390625, 1.        ]))
+    """
+    size = np.abs(matrix)
+    rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
+    for _ in range(MOST_PASSES):
+        by_row, by_column = size.max(axis=1, initial=0.0), size.max(axis=0, initial=0.0)
+        if _is_even(by_row) and _is_even(by_column):
+            break
+        down, across = _root(by_row), _root(by_column)
+        rows *= down
+        columns *= across
+        size *= down[:, None]
+        size *= across
+    return rows, columns
+
+
+def _is_even(maxima: FloatArray) -> bool:
+    """Tell whether all nonzero maxima lie between 1/1024 and 1024."""
+    values = maxima.tolist()
+    return all(1.0 / EVEN <= value <= EVEN or value == 0.0 for value in values)
+
+
+def _root(maxima: FloatArray) -> FloatArray:
+    """Give the powers of two nearest to one over the square root, 1 for a zero."""
+    exponents = np.frexp(maxima)[1]
+    return np.ldexp(1.0, -((exponents + np.sign(exponents)) // 2))

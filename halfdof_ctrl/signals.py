@@ -1,0 +1,50 @@
+"""Signals of a linear system as functions of its state and of its inputs' derivatives.
+
+w = X x + U_0 u + U_1 u' + U_2 u'' + ...,    x' = A x + B u                            (6)
+w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                            (7)
+"""
+
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+
+from halfdof_ctrl.arrays import FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """k signals of the form (6), for N states and m inputs."""
+
+    X: FloatArray  #: (k, N) from the state
+    U: tuple[FloatArray, ...]  #: (k, m) each, from the inputs and their derivatives; no trailing zeros
+
+    def derivative(self, A: FloatArray, B: FloatArray) -> "Signal":
+        """Differentiate once along the system's motion, equation (7)."""
+        return Signal(self.X @ A, trimmed((self.X @ B, *self.U)))
+
+    def combined(self, weights: FloatArray) -> "Signal":
+        """Give ``weights @ w``."""
+        return Signal(weights @ self.X, trimmed(tuple([weights @ part for part in self.U])))
+
+    def plus(self, other: "Signal") -> "Signal":
+        """Add another signal of the same size."""
+        parts = [_sum(mine, theirs) for mine, theirs in zip_longest(self.U, other.U)]
+        return Signal(self.X + other.X, trimmed(tuple(parts)))
+
+    def direct(self, inputs: int) -> FloatArray:
+        """Give U_0, zeros if there is none."""
+        return self.U[0] if self.U else np.zeros((self.X.shape[0], inputs))
+
+
+def trimmed(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    """Drop coefficients of zeros at the end."""
+    while parts and not parts[-1].any():
+        parts = parts[:-1]
+    return parts
+
+
+def _sum(mine: FloatArray | None, theirs: FloatArray | None) -> FloatArray:
+    if mine is None or theirs is None:
+        return mine if theirs is None else theirs  # type: ignore[return-value]
+    return mine + theirs
