@@ -2,6 +2,7 @@
 
 from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, zeros
+from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.mounts import hydromount
@@ -17,11 +18,13 @@ __all__ = [
     "HalfdofError",
     "PencilStructure",
     "SecondOrderModel",
+    "StateFeedback",
     "crosscheck",
     "descriptor_response",
     "exact_reduction",
     "frequency_response",
     "hydromount",
+    "lqr",
     "mech2ss",
     "mechss",
     "pencil_structure",

@@ -13,6 +13,8 @@ ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
 
 DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
+MATRIX_DIMENSIONS = 2
+REAL = np.dtype(np.float64)
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -42,7 +44,9 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
     array = _numbers(value, letter)
     if shape is not None and array.ndim == 1:
         array = _as_row_or_column(array, shape)
-    if array.ndim != 2 or (array.shape != shape if shape is not None else array.shape[0] != array.shape[1]):
+    if array.ndim != MATRIX_DIMENSIONS or (
+        array.shape != shape if shape is not None else array.shape[0] != array.shape[1]
+    ):
         expected = "square" if shape is None else f"{shape[0]} x {shape[1]}"
         found = " x ".join(map(str, array.shape)) or "a single number"
         msg = (
@@ -52,7 +56,7 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
     if array.size == 0 and shape is None:
         msg = f"{letter} is empty (0 x 0): a model needs at least one DOF."
         raise MatrixError(msg, matrix=letter)
-    if not np.isfinite(array).all():
+    if not np.logical_and.reduce(np.isfinite(array), axis=None):
         row, column = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
         msg = f"{letter}[{row}, {column}] is {array[row, column]}: every entry must be a finite number."
         raise MatrixError(msg, matrix=letter)
@@ -71,7 +75,13 @@ def unit_matrix(size: int) -> FloatArray:
 
 def is_complex(matrix: Matrix) -> bool:
     """Tell whether a checked matrix has imaginary parts."""
-    return matrix.dtype.kind == "c"
+    return matrix.dtype != REAL
+
+
+def is_zero(matrix: Matrix) -> bool:
+    """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares."""
+    shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)
+    return shared or not matrix.any()
 
 
 def _numbers(value: object, letter: str) -> Matrix:
@@ -82,7 +92,7 @@ def _numbers(value: object, letter: str) -> Matrix:
         raise MatrixError(msg, matrix=letter)
     try:
         array = np.array(value)
-        if array.dtype == np.float64:
+        if array.dtype == REAL:
             return array
         if array.dtype.kind in "biufO":
             return array.astype(np.float64)

@@ -24,11 +24,11 @@ from halfdof_ctrl.errors import MatrixError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
+from halfdof_ctrl.spectrum import ROUNDING, eigenvalues_and_rounding
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
-ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault, in first order
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
 MOST_POLE_POINTS = 100  #: poles that get a point of their own
@@ -201,7 +201,7 @@ def _compare_transfer(
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
     errors = difference / (largest + rounding / TRANSFER_TOLERANCE)
-    i, j, k = np.unravel_index(np.argmax(errors), errors.shape)
+    i, j, k = _place_of_largest(errors)
     worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {_in_words(points[k])}"
     with np.errstate(divide="ignore", invalid="ignore"):
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
@@ -234,13 +234,10 @@ def _compare_poles(A: FloatArray, finite: ComplexArray) -> tuple[float, str]:
         return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
     if finite.size == 0:
         return 0.0, "no poles"
-    poles, left, right = scipy.linalg.eig(A, left=True, right=True)
+    poles, rounding = eigenvalues_and_rounding(A)
     rows, columns = scipy.optimize.linear_sum_assignment(np.abs(poles[:, None] - finite))
-    cosine = np.abs(np.einsum("ij,ij->j", left.conj(), right))[rows]
-    with np.errstate(divide="ignore"):
-        rounding = ROUNDING * np.linalg.norm(A, 2) / cosine
     difference = np.abs(poles[rows] - finite[columns])
-    allowed = np.abs(finite[columns]) + rounding / POLE_TOLERANCE
+    allowed = np.abs(finite[columns]) + rounding[rows] / POLE_TOLERANCE
     errors = np.where(difference > 0.0, difference / allowed, 0.0)
     worst = int(np.argmax(errors))
     return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"
@@ -264,11 +261,11 @@ def _compare_steps(
             found[:, j, done : done + segment.steps] = np.asarray(part.y).reshape(sys.noutputs, -1)[:, 1:]
             state = np.asarray(part.x).reshape(sys.nstates, -1)[:, -1]
             if j == 0:
-                times.append(start + time[1:])
-            done, start = done + segment.steps, start + time[-1]
+                times.append(np.asarray(start + time[1:]))
+            done, start = done + segment.steps, start + float(time[-1])
     time = np.concatenate(times)
     errors = np.abs(found - exact) / _channel_size(np.abs(exact))
-    i, j, k = np.unravel_index(np.argmax(errors), errors.shape)
+    i, j, k = _place_of_largest(errors)
     return float(errors[i, j, k]), f"{model.outputs[i]} from {model.inputs[j]} at t = {time[k]:.4g} s", float(time[-1])
 
 
@@ -277,6 +274,11 @@ def _channel_size(size: FloatArray) -> FloatArray:
     largest = size.max(axis=2, keepdims=True)
     overall = size.max(initial=0.0)
     return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
+
+
+def _place_of_largest(errors: FloatArray) -> tuple[int, int, int]:
+    i, j, k = np.unravel_index(int(np.argmax(errors)), errors.shape)
+    return int(i), int(j), int(k)
 
 
 def _in_words(s: complex) -> str:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.arrays import ComplexArray, Matrix
 from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
@@ -135,8 +135,8 @@ def require_regular(model: SecondOrderModel) -> None:
     dofs = tuple([model.dofs[index] for index in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
     msg = (
         f"The pencil is singular: det P(s) vanishes at every s (smallest singular value {values[-1]:.1e} of "
-        f"{values[0]:.1e} after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node without "
-        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is "
+        f"{values[0]:.1e} after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node "
+        "without spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is "
         "redundant or give it a stiffness."
     )
     raise SingularPencilError(msg, dofs=dofs)
@@ -147,18 +147,24 @@ def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float
     R0, R1, R2 = _equilibrated(coefficients)
     scale = _time_scale((R0, R1, R2))
     R1, R2 = R1 * scale, R2 * scale**2
-    left, values, right = scipy.linalg.svd(R2, full_matrices=False)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(R2.shape) * values[0])) if values.size else 0
-    left, right = _without_specks(left[:, :rank] * values[:rank]), _without_specks(right[:rank])
+    left, right = _low_rank_factors(R2)
+    rank = right.shape[0]
     corner = np.zeros((rank, rank))
     E = np.block([[R1, left], [right, corner]])
     A = np.block([[-R0, np.zeros_like(left)], [np.zeros_like(right), np.eye(rank)]])
     return finite_part(A, E), scale
 
 
-def _without_specks(vectors: Matrix) -> Matrix:
-    """Set entries to zero that are rounding in vectors of length about one."""
-    return np.where(np.abs(vectors) <= 4 * np.finfo(float).eps, 0.0, vectors)
+def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
+    """Factor a matrix as L R with as many columns in L as its rank; null rows and columns stay exactly null."""
+    rows, columns = matrix.any(axis=1), matrix.any(axis=0)
+    left, values, right = scipy.linalg.svd(matrix[np.ix_(rows, columns)], full_matrices=False)
+    rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(matrix.shape) * values[0])) if values.size else 0
+    speck = max(matrix.shape) * np.finfo(float).eps * (values[0] / values[rank - 1] if rank else 1.0)
+    L, R = np.zeros((matrix.shape[0], rank), left.dtype), np.zeros((rank, matrix.shape[1]), right.dtype)
+    L[rows] = np.where(np.abs(left[:, :rank]) <= speck, 0.0, left[:, :rank]) * values[:rank]
+    R[:, columns] = np.where(np.abs(right[:rank]) <= speck, 0.0, right[:rank])
+    return L, R
 
 
 def _equilibrated(coefficients: Sequence[Matrix]) -> tuple[Matrix, Matrix, Matrix]:

@@ -64,7 +64,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
         coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
     if coarse.any():
         solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
-    return np.swapaxes(columns, 1, 2) * solution
+    return np.asarray(np.swapaxes(columns, 1, 2) * solution, dtype=np.complex128)
 
 
 def _solve_each(P: ComplexArray, B: ComplexArray) -> ComplexArray:

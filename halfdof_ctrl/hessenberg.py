@@ -47,8 +47,9 @@ def state_space_response(
     values[:] = D[:, :, None]
     if A.shape[0] == 0:
         return values
-    balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    inputs, outputs = B / scale[:, None], C * scale
+    matrix, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+    balanced = np.asarray(matrix, dtype=np.float64)
+    inputs, outputs = np.asarray(B / scale[:, None]), np.asarray(C * scale)
     batch = max(1, POINT_ENTRIES // A.shape[0])
     if B.shape[1] <= C.shape[0]:
         _add_channels(values, balanced, inputs, outputs, points, batch)
@@ -138,11 +139,12 @@ class ShiftedSolver:
 def _reflected(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
     """Reflect so that b becomes beta e_1: give P A P, v and beta, P = I - v v^T."""
     norm = float(np.linalg.norm(b))
-    v = b / norm if norm > 0.0 else np.zeros_like(b)
-    sign = -1.0 if v[0] > 0.0 else 1.0
-    if norm > 0.0:
-        v[0] -= sign
-        v *= np.sqrt(2.0) / np.linalg.norm(v)
+    if not b[1:].any():
+        return A.copy(), np.zeros_like(b), float(b[0])
+    sign = -1.0 if b[0] > 0.0 else 1.0
+    v = b / norm
+    v[0] -= sign
+    v *= np.sqrt(2.0) / np.linalg.norm(v)
     reflected = A - np.outer(v, v @ A)
     return reflected - np.outer(reflected @ v, v), v, sign * norm
 
@@ -162,4 +164,4 @@ def _real_times_complex(matrix: FloatArray, x: ComplexArray) -> ComplexArray:
 def _column_norms(x: ComplexArray) -> FloatArray:
     real = x.view(np.float64)
     squares = np.einsum("ij,ij->j", real, real)
-    return np.sqrt(squares[0::2] + squares[1::2])
+    return np.asarray(np.sqrt(squares[0::2] + squares[1::2]))

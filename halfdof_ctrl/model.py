@@ -16,7 +16,16 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.arrays import ComplexArray, Matrix, checked_matrix, is_complex, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.arrays import (
+    MATRIX_DIMENSIONS,
+    ComplexArray,
+    Matrix,
+    checked_matrix,
+    is_complex,
+    read_only,
+    unit_matrix,
+    zero_matrix,
+)
 from halfdof_ctrl.errors import MatrixError, SignalNameError
 from halfdof_ctrl.evaluation import quadratic_transfer
 from halfdof_ctrl.names import (
@@ -31,7 +40,6 @@ from halfdof_ctrl.names import (
 
 Names: TypeAlias = str | Sequence[str] | None
 
-MATRIX_DIMENSIONS = 2
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
 LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
 
@@ -64,14 +72,17 @@ class SecondOrderModel:
     @property
     def is_complex(self) -> bool:
         """Whether any matrix has imaginary parts (structural damping)."""
-        return bool(self.complex_matrices)
+        return any([is_complex(matrix) for matrix in self._matrices()])  # noqa: C419  # a list is faster here
 
     @property
     def complex_matrices(self) -> tuple[str, ...]:
         """Letters of the complex matrices."""
-        return tuple([letter for letter in LETTERS if is_complex(getattr(self, letter))])
+        return tuple([letter for letter, matrix in zip(LETTERS, self._matrices(), strict=True) if is_complex(matrix)])
 
-    def __call__(self, s: npt.ArrayLike, squeeze: bool | None = None) -> ComplexArray:
+    def _matrices(self) -> tuple[Matrix, ...]:
+        return (self.M, self.C, self.K, self.B, self.Bv, self.Ba, self.F, self.G, self.H, self.D, self.Dv, self.Da)
+
+    def __call__(self, s: npt.ArrayLike, squeeze: bool | None = None) -> ComplexArray:  # noqa: FBT001  # as in control
         """Transfer function H(s) of equation (1) by a direct solve at each `s`.
 
         Parameters
@@ -248,8 +259,8 @@ def mechss(
 
 def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Tell which columns of M are not null, and which of the others have a column in C that is not."""
-    inertial = M.any(axis=0)
-    return inertial, C.any(axis=0) & ~inertial
+    inertial = np.asarray(M.any(axis=0))
+    return inertial, np.asarray(C.any(axis=0) & ~inertial)
 
 
 def _square_matrices(*given: object) -> tuple[Matrix, Matrix, Matrix]:
@@ -267,17 +278,17 @@ def _square_matrices(*given: object) -> tuple[Matrix, Matrix, Matrix]:
     return M, C, K
 
 
-def _signals(given: Sequence[object], axis: int, default: int) -> int:
+def _signals(given: Sequence[npt.ArrayLike | None], axis: int, default: int) -> int:
     """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
     for value in given:
         if value is not None:
-            shape = np.shape(value)  # type: ignore[arg-type]
+            shape = np.shape(value)
             return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
     return default
 
 
 def _checked_or_zero(value: object, letter: str, rows: int, columns: int) -> Matrix:
-    if value is None or (isinstance(value, int | float) and value == 0):
+    if value is None or (type(value) in {int, float} and value == 0):
         return zero_matrix(rows, columns)
     return checked_matrix(value, letter, (rows, columns))
 

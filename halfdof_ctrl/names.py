@@ -6,6 +6,7 @@ labels such as ``101.1`` need, so a label writes it as a colon, and a colon as `
 """
 
 from collections.abc import Iterable, Sequence
+from functools import lru_cache
 from itertools import chain
 
 from halfdof_ctrl.errors import SignalNameError
@@ -25,6 +26,12 @@ def control_label(name: str) -> str:
     return name
 
 
+@lru_cache(maxsize=256)
+def control_labels(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Write names as labels that python-control takes."""
+    return tuple([control_label(name) for name in names])
+
+
 def name_from_label(label: str) -> str:
     """Give the model's name behind a label of `control_label`.
 
@@ -34,18 +41,20 @@ def name_from_label(label: str) -> str:
     return label.replace(":", ".").replace("%3A", ":").replace("%25", "%")
 
 
-def motion_names(dofs: Iterable[str], derivative: int) -> tuple[str, ...]:
+@lru_cache(maxsize=256)
+def motion_names(dofs: tuple[str, ...], derivative: int) -> tuple[str, ...]:
     """Names of the displacements (0), velocities (1) or accelerations (2) of the DOFs."""
     suffix = DERIVATIVE_SUFFIXES[derivative]
     return tuple([dof + suffix for dof in dofs])
 
 
-def force_names(dofs: Iterable[str]) -> tuple[str, ...]:
+@lru_cache(maxsize=256)
+def force_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the unit forces on the DOFs."""
     return tuple([FORCE_PREFIX + dof for dof in dofs])
 
 
-def motions(dofs: Sequence[str]) -> dict[str, tuple[int, int]]:
+def motions(dofs: tuple[str, ...]) -> dict[str, tuple[int, int]]:
     """Map every displacement, velocity and acceleration to (position of the DOF, derivative)."""
     return {
         name: (index, derivative)
@@ -94,7 +103,13 @@ def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
     SignalNameError
         As `checked_names`, or a DOF is named like the velocity or acceleration of another.
     """
-    dofs = checked_names(given, count, "DOFs")
+    names = (given,) if isinstance(given, str) else tuple(given)
+    return _checked_dofs(names, count) if all(type(name) is str for name in names) else checked_names(names, count, "DOFs")
+
+
+@lru_cache(maxsize=256)
+def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
+    dofs = checked_names(names, count, "DOFs")
     every = tuple(chain.from_iterable(motion_names(dofs, derivative) for derivative in range(3)))
     if len(set(every)) != len(every):
         clash = _duplicates(every)

@@ -47,7 +47,7 @@ class RankDecision:
     def gap(self) -> float:
         """Smallest singular value that counts over the largest that does not (inf if none)."""
         values = self.singular_values
-        if self.rank == 0 or self.rank == values.size or values[self.rank] == 0.0:
+        if self.rank in {0, values.size} or values[self.rank] == 0.0:
             return float("inf")
         return float(values[self.rank - 1] / values[self.rank])
 
@@ -59,6 +59,7 @@ class DofPartition:
     method: Literal["selection", "orthogonal"]
     order: IndexArray  #: (n,) selection: the DOFs in the order inertial, half, static
     basis: FloatArray | None  #: (n, n) T, or None where T is the selection by `order`
+    in_order: bool  #: selection that leaves the DOFs in their order
     n_inertial: int
     n_half: int
     n_static: int
@@ -81,27 +82,26 @@ class DofPartition:
         return self.coordinates[self.n_inertial + self.n_half :]
 
     @property
-    def T(self) -> FloatArray:
+    def T(self) -> FloatArray:  # noqa: N802
         """(n, n) transformation q = T p, its columns in the order inertial, half, static."""
-        return unit_matrix(self.order.size)[:, self.order] if self.basis is None else self.basis
+        if self.basis is not None:
+            return self.basis
+        unit = unit_matrix(self.order.size)
+        return unit if self.in_order else np.asarray(unit[:, self.order])
 
     def times_basis(self, matrix: Matrix, first: int, stop: int | None) -> FloatArray:
         """Give the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns."""
+        if self.in_order:
+            return matrix[:, first:stop]
         if self.basis is None:
-            return matrix[:, self.order[first:stop]]
-        return matrix @ self.basis[:, first:stop]
-
-    def basis_times(self, coordinates: FloatArray) -> FloatArray:
-        """Give ``q = T p`` for an (n, k) array."""
-        if self.basis is not None:
-            return self.basis @ coordinates
-        displacements = np.empty_like(coordinates)
-        displacements[self.order] = coordinates
-        return displacements
+            return np.asarray(matrix[:, self.order[first:stop]])
+        return np.asarray(matrix @ self.basis[:, first:stop])
 
     def to_coordinates(self, displacements: FloatArray) -> FloatArray:
         """Give ``p = T^-1 q`` for an (n, k) array."""
-        return displacements[self.order] if self.basis is None else np.linalg.solve(self.basis, displacements)
+        if self.basis is None:
+            return np.asarray(displacements[self.order])
+        return np.asarray(np.linalg.solve(self.basis, displacements), dtype=np.float64)
 
 
 def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
@@ -123,18 +123,19 @@ def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPart
     inertial, half = null_column_kinds(model.M, model.C)
     if tol is not None or _spread_is_wide(model, inertial):
         inertial, half = _without_tiny_masses(model, inertial, 0.0 if tol is None else tol)
-    kind = np.where(inertial, 0, np.where(half, 1, 2))
-    order = np.argsort(kind, kind="stable")
-    n_inertial, n_half = int(np.count_nonzero(inertial)), int(np.count_nonzero(half))
-    names = model.dofs
+    massive, damped = inertial.tolist(), half.tolist()
+    every = range(len(massive))
+    with_mass, with_damping = [i for i in every if massive[i]], [i for i in every if damped[i]]
+    order = [*with_mass, *with_damping, *[i for i in every if not (massive[i] or damped[i])]]
     return DofPartition(
         method="selection",
-        order=order,
+        order=np.array(order),
         basis=None,
-        n_inertial=n_inertial,
-        n_half=n_half,
-        n_static=len(names) - n_inertial - n_half,
-        coordinates=tuple([names[index] for index in order.tolist()]),
+        in_order=order == list(every),
+        n_inertial=len(with_mass),
+        n_half=len(with_damping),
+        n_static=len(order) - len(with_mass) - len(with_damping),
+        coordinates=tuple([model.dofs[i] for i in order]),
         evidence=(),
     )
 
@@ -182,6 +183,7 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
         method="orthogonal",
         order=np.arange(basis.shape[0]),
         basis=read_only(basis),
+        in_order=False,
         n_inertial=massive.shape[1],
         n_half=half.shape[1],
         n_static=static.shape[1],
@@ -212,8 +214,8 @@ def _without_tiny_masses(
         names = [model.dofs[index] for index in tiny.tolist()]
         largest = float(ratio[tiny].max())
         msg = (
-            f"DOFs {listed(names)} have a mass of at most {largest:.1e} of the largest (in scaled units), but not zero: "
-            f"their two states are far faster than the others and cost digits. If they are meant to be "
+            f"DOFs {listed(names)} have a mass of at most {largest:.1e} of the largest (in scaled units), but not "
+            "zero: their two states are far faster than the others and cost digits. If they are meant to be "
             f"massless, set their mass to zero or pass tol={2.0 * largest:.0e}."
         )
         warnings.warn(msg, NearlyMasslessWarning, stacklevel=5)

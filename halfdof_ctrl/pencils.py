@@ -89,8 +89,9 @@ class _Deflation:
         """Give an orthogonal matrix whose first columns span the range, and the rank."""
         if matrix.size == 0:
             return np.eye(matrix.shape[0]), 0
-        left, values, _ = scipy.linalg.svd(matrix)
-        rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(matrix.shape) * max(values[0], 0.0)))
+        left, triangle, _ = scipy.linalg.qr(matrix, pivoting=True)
+        values = np.abs(np.diagonal(triangle))
+        rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(matrix.shape) * values[0]))
         if 0 < rank < values.size and values[rank] > 0.0:
             self.gap = min(self.gap, float(values[rank - 1] / values[rank]))
         return left, rank

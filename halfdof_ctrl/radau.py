@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 import scipy.special
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.model import SecondOrderModel
 
 STAGES = 5
@@ -105,7 +105,7 @@ class RadauStep:
     h: float  #: step [s]
     A: FloatArray
     rows: FloatArray  #: (n, 1) powers of two that equilibrate the rows
-    factors: tuple[tuple[ComplexArray, FloatArray], ...]  #: LU for each eigenvalue of `_upper_half`
+    factors: tuple[tuple[Matrix, Matrix], ...]  #: LU for each eigenvalue of `_upper_half`
 
     @classmethod
     def factorized(cls, E: FloatArray, A: FloatArray, h: float) -> "RadauStep":

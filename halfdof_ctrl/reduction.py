@@ -39,7 +39,8 @@ from halfdof_ctrl.signals import Signal, trimmed
 
 Road: TypeAlias = Literal["selection", "orthogonal"]
 
-SINGULAR = np.finfo(float).eps  #: times n: W is singular below this reciprocal condition number
+PLAINLY_REGULAR = 1e-6  #: W with this reciprocal condition number is nonsingular in any units
+SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
 
@@ -72,41 +73,56 @@ class RecoveredMotion:
         for derivative, history in enumerate((self.displacement, self.velocity)):
             names = motion_names(self.dofs, derivative)
             if name in names:
-                return history[names.index(name)]
+                return np.asarray(history[names.index(name)])
         raise unknown_name_error(name, "motion", (*self.dofs, *motion_names(self.dofs, 1)))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LeadingMatrix:
-    """W of equation (2), equilibrated by powers of two and factorized once."""
+    """W of equation (2), factorized; equilibrated by powers of two where its condition asks for it."""
 
-    factors: FloatArray  #: (n, n) L and U of the equilibrated W
+    factors: FloatArray  #: (n, n) L and U
     pivots: npt.NDArray[np.int32]
-    rows: FloatArray  #: (n,) powers of two
-    columns: FloatArray  #: (n,) powers of two
-    rcond: float  #: reciprocal 1-norm condition number of the equilibrated W; 0 if exactly singular
+    rows: FloatArray | None  #: (n,) powers of two, None where W was taken as it is
+    columns: FloatArray | None  #: (n,) likewise
+    equilibrated: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
+    rcond: float  #: reciprocal 1-norm condition number of the matrix that was factorized; 0 if exactly singular
 
     @classmethod
     def factorized(cls, W: FloatArray) -> "LeadingMatrix":
-        """Equilibrate, factorize, and estimate the condition."""
+        """Factorize and estimate the condition; equilibrate first where that might matter.
+
+        The equilibrated matrix is conditioned at least about as well (A. van der Sluis, 1969), so a W that is well
+        conditioned as it stands needs no second look.
+        """
+        factors, pivots, rcond = _lu_and_rcond(W)
+        if rcond >= PLAINLY_REGULAR:
+            return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
         rows, columns = equilibrating_factors(W)
-        balanced = np.asfortranarray(W * rows[:, None] * columns)
-        norm = dlange("1", balanced)
-        factors, pivots, exact_zero = dgetrf(balanced, overwrite_a=True)
-        rcond = 0.0 if exact_zero else dgecon(factors, norm)[0]
-        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, rcond=rcond)
+        matrix = W * rows[:, None] * columns
+        factors, pivots, rcond = _lu_and_rcond(matrix)
+        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
 
     @property
     def is_singular(self) -> bool:
         """Whether W is singular to working precision: rcond below n eps."""
-        return self.rcond < self.rows.size * SINGULAR
+        return self.rcond < len(self.factors) * SINGULAR
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 right`` for an (n, k) array, which is overwritten."""
-        right *= self.rows[:, None]
-        solution, _ = dgetrs(self.factors, self.pivots, right, overwrite_b=True)
-        solution *= self.columns[:, None]
-        return np.asarray(solution)
+        """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
+        if self.rows is None or self.columns is None or self.equilibrated is None:
+            return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
+        right = right * self.rows[:, None]
+        solution = dgetrs(self.factors, self.pivots, right)[0]
+        solution += dgetrs(self.factors, self.pivots, right - self.equilibrated @ solution)[0]
+        return np.asarray(solution * self.columns[:, None])
+
+
+def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
+    """Factorize and estimate the reciprocal 1-norm condition number, 0 where a pivot vanishes."""
+    norm = dlange("1", matrix)  # type: ignore[call-arg]  # the stubs lack its first argument
+    factors, pivots, exact_zero = dgetrf(matrix)
+    return factors, pivots, 0.0 if exact_zero else float(dgecon(factors, norm)[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -127,7 +143,7 @@ class ExactReduction:
     @property
     def order(self) -> int:
         """Number of states, which is the number of finite eigenvalues."""
-        return self.A.shape[0]
+        return len(self.A)
 
     @property
     def n_infinite(self) -> int:
@@ -141,7 +157,7 @@ class ExactReduction:
 
     @property
     def rcond(self) -> float:
-        """Reciprocal condition number of the equilibrated W, on which the count of states rests."""
+        """Reciprocal condition number of W, on which the count of states rests (see `LeadingMatrix`)."""
         return self.leading.rcond
 
     @property
@@ -320,13 +336,12 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     for k, matrix in enumerate(forces):
         right[:, N + k * m : N + (k + 1) * m] = matrix
     solved = leading.solve(right)
-    solved += 0.0  # no negative zeros in what users print
-    A = np.zeros((N, N), order="F")
-    A[:n_i, moving:] = unit_matrix(n_i)
-    A[n_i:moving] = solved[n_i:moving, :N]
-    A[moving:] = solved[:n_i, :N]
-    driven = [_state_rows(solved[:, N + k * m : N + (k + 1) * m], n_i, moving) for k in range(len(forces))]
-    B, shift = _absorbed(A, driven)
+    rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
+    rate[:n_i, moving:N] = unit_matrix(n_i)
+    np.add(solved[n_i:moving], 0.0, out=rate[n_i:moving])  # adding zero leaves no negative zeros to be printed
+    np.add(solved[:n_i], 0.0, out=rate[moving:])
+    A = rate[:, :N]
+    B, shift = _absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     return ExactReduction(
         model=model,
         partition=partition,
@@ -380,14 +395,6 @@ def _leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatA
     return W
 
 
-def _state_rows(solved: FloatArray, n_i: int, moving: int) -> FloatArray:
-    """Order the rows p''_i, p'_c of a solution of (3) as the derivative of x, zeros for p'_i."""
-    rows = np.zeros((moving + n_i, solved.shape[1]), order="F")
-    rows[n_i:moving] = solved[n_i:moving]
-    rows[moving:] = solved[:n_i]
-    return rows
-
-
 def _absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
     """Turn x' = A x + B_0 u + B_1 u' + B_2 u'' into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u', (5)."""
     shift: tuple[FloatArray, ...] = ()
@@ -403,24 +410,22 @@ def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tu
     n, n_i, moving = solved.shape[0], partition.n_inertial, partition.n_inertial + partition.n_half
     N = moving + n_i
     X = np.zeros((n, N))
-    X[:moving, :moving] = unit_matrix(moving)
-    X[moving:] = solved[moving:, :N]
-    inputs = []
-    for start in range(N, solved.shape[1], m):
-        U = np.zeros((n, m))
-        U[moving:] = solved[moving:, start : start + m]
-        inputs.append(U)
-    p = Signal(X, trimmed(tuple(inputs)))
-    if shift:
-        p = p.plus(Signal(np.zeros_like(X), tuple([X @ part for part in shift])))
-    return Signal(partition.basis_times(p.X), tuple([partition.basis_times(part) for part in p.U]))
+    X[:, :moving] = partition.T[:, :moving]
+    inputs: tuple[FloatArray, ...] = ()
+    if moving < n:
+        T_k = partition.T[:, moving:]
+        X += T_k @ solved[moving:, :N]
+        inputs = tuple([T_k @ solved[moving:, start : start + m] for start in range(N, solved.shape[1], m)])
+    q = Signal(X, trimmed(inputs))
+    return q.plus(Signal(np.zeros_like(X), tuple([X @ part for part in shift]))) if shift else q
 
 
 def _singular_error(
     model: SecondOrderModel, partition: DofPartition, W: FloatArray, leading: LeadingMatrix
 ) -> SingularLeadingMatrixError:
     """Make the refusal of a singular W, naming the DOFs of its null vector."""
-    _, _, right = scipy.linalg.svd(W * leading.rows[:, None] * leading.columns)
+    rows, columns = equilibrating_factors(W)
+    _, _, right = scipy.linalg.svd(W * rows[:, None] * columns)
     null = np.abs(right[-1])
     concerned = partition.T[:, null > NULL_VECTOR_SHARE * null.max()].any(axis=1)
     dofs = tuple([model.dofs[index] for index in np.flatnonzero(concerned).tolist()])

@@ -102,8 +102,9 @@ def frequency_response(
         sys = sysdata
     frequencies = checked_frequencies(default_frequencies(sys.poles()) if omega is None else omega)
     points = np.exp(1j * frequencies * float(sys.dt)) if sys.isdtime(strict=True) else 1j * frequencies
-    values = state_space_response(*(np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D)), points)
-    return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, sys.dt)
+    A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
+    values = state_space_response(A, B, C, D, points)
+    return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
 
 
 def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> FloatArray:
@@ -143,6 +144,7 @@ def _data(
     inputs: tuple[str, ...] | list[str],
     outputs: tuple[str, ...] | list[str],
     name: str | None,
+    *,
     dt: float | bool | None = 0,
 ) -> control.FrequencyResponseData:
     labels = {} if name is None else {"name": control_label(name), "sysname": control_label(name)}

@@ -9,7 +9,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.arrays import FloatArray, is_zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,7 +39,7 @@ class Signal:
 
 def trimmed(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     """Drop coefficients of zeros at the end."""
-    while parts and not parts[-1].any():
+    while parts and is_zero(parts[-1]):
         parts = parts[:-1]
     return parts
 

@@ -12,10 +12,10 @@ import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.arrays import FloatArray, is_zero
 from halfdof_ctrl.errors import ImproperError, SignalNameError
 from halfdof_ctrl.model import Names, SecondOrderModel, mechss
-from halfdof_ctrl.names import control_label, listed
+from halfdof_ctrl.names import control_label, control_labels, listed
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.signals import Signal, trimmed
 
@@ -116,9 +116,9 @@ def labelled_system(
         B,
         C,
         D,
-        states=[control_label(state) for state in states],
-        inputs=[control_label(signal) for signal in inputs],
-        outputs=[control_label(signal) for signal in outputs],
+        states=list(control_labels(states)),
+        inputs=list(control_labels(inputs)),
+        outputs=list(control_labels(outputs)),
         **labels,
     )
 
@@ -127,9 +127,9 @@ def output_signal(reduction: ExactReduction) -> Signal:
     """Give the outputs of the reduced model as functions of the state, the inputs and their derivatives."""
     model, q = reduction.model, reduction.displacement
     output = q.combined(model.F)
-    if model.G.any():
+    if not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(reduction.A, reduction.B))
-    if model.H.any():
+    if not is_zero(model.H):
         acceleration = q.combined(model.H).derivative(reduction.A, reduction.B).derivative(reduction.A, reduction.B)
         output = output.plus(acceleration)
     direct = trimmed((model.D, model.Dv, model.Da))
@@ -161,7 +161,8 @@ def _without_rounding(reduction: ExactReduction, output: Signal) -> Signal:
 
 def _sizes_of_solution(reduction: ExactReduction) -> tuple[FloatArray, FloatArray]:
     """Give the size that rounding in B (N, m) and in U_0 of all DOFs (n, m) is relative to."""
-    part, columns = reduction.partition, reduction.leading.columns
+    part = reduction.partition
+    columns = np.ones(len(reduction.model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
     n_i, moving = part.n_inertial, part.n_inertial + part.n_half
     B, direct = np.abs(reduction.B), reduction.displacement.direct(len(reduction.model.inputs))
     solution = np.vstack([B[moving:], B[n_i:moving], np.abs(part.to_coordinates(direct))[moving:]])

@@ -1,0 +1,250 @@
+"""What the plots share: axes to draw on, legends that cover no data, and labels with units.
+
+A signal's unit follows from the model: a DOF's displacement is in m, its derivatives in m/s and m/s^2, the
+force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
+"""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, TypeAlias
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from halfdof_ctrl.errors import ParameterError
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.names import force_names, motion_names, name_from_label, unknown_name_error
+
+AxesArray: TypeAlias = npt.NDArray[np.object_]
+AxesLike: TypeAlias = Axes | npt.ArrayLike | None
+Units: TypeAlias = Mapping[str, str] | None
+
+FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
+LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
+LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
+CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
+FORCE_UNITS = {"m": "N", "mm": "N", "rad": "N m", "m^3": "Pa"}  #: of the force on a DOF, by the DOF's unit
+
+
+def prepared_axes(
+    ax: AxesLike, shape: tuple[int, int], what: str, *, height: float, ratios: Iterable[float] | None = None
+) -> AxesArray:
+    """Give an array of axes of the wanted shape: the given ones, or those of a new figure.
+
+    Parameters
+    ----------
+    ax : Axes, array_like of Axes, or None
+        A single Axes where one is enough; one dimension where there is one row or one column.
+    shape : (int, int)
+        Rows and columns that the plot needs.
+    what : str
+        What stands in rows and columns, for the message.
+    height : float
+        Of a new figure [in].
+    ratios : iterable of float, optional
+        Heights of the rows of a new figure, relative to each other.
+
+    Raises
+    ------
+    ParameterError
+        Axes of another shape, or things that are no Axes.
+    """
+    rows, columns = shape
+    if ax is None:
+        with plt.rc_context(control.config.defaults["ctrlplot.rcParams"]):
+            _, axes = plt.subplots(
+                rows,
+                columns,
+                squeeze=False,
+                sharex="col",
+                figsize=(max(FIGURE_WIDTH, 3.0 * columns), height),
+                height_ratios=None if ratios is None else list(ratios),
+                layout="constrained",
+            )
+        return axes
+    given = np.asarray(ax, dtype=object)
+    if not all(isinstance(entry, Axes) for entry in given.flat):
+        msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."
+        raise ParameterError(msg, parameter="ax", value=ax)
+    if given.shape != shape and not (given.ndim < 2 and min(shape) == 1 and given.size == max(shape)):  # noqa: PLR2004
+        msg = (
+            f"ax has shape {given.shape}, but this plot needs axes of shape {shape}: {what}. "
+            f"Pass plt.subplots({rows}, {columns})[1], or leave ax out for a new figure."
+        )
+        raise ParameterError(msg, parameter="ax", value=given.shape)
+    return given.reshape(shape)
+
+
+def no_lines(axes: AxesArray) -> npt.NDArray[np.object_]:
+    """Give an empty list for each of the axes."""
+    lines = np.empty(axes.shape, dtype=object)
+    for place in np.ndindex(axes.shape):
+        lines[place] = []
+    return lines
+
+
+def finished_plot(
+    lines: npt.NDArray[np.object_], axes: AxesArray, title: str | None, *, own: bool
+) -> control.ControlPlot:
+    """Add legend and title, and pack everything up. `own` tells that the figure was made here."""
+    legend = draw_legend(axes, own=own)
+    draw_title(axes, title, own=own)
+    return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)
+
+
+def require_system(sysdata: object) -> None:
+    """Refuse what is neither a state space nor a model.
+
+    Raises
+    ------
+    ParameterError
+        Anything else, such as a transfer function.
+    """
+    if not isinstance(sysdata, control.StateSpace | SecondOrderModel):
+        msg = (
+            f"sysdata must be a SecondOrderModel or a control.StateSpace, not {type(sysdata).__name__}. "
+            "Convert it first, by mechss or control.ss."
+        )
+        raise ParameterError(msg, parameter="sysdata", value=sysdata)
+
+
+def legend_prefix(label: str | None, system: control.StateSpace | SecondOrderModel) -> str:
+    """Give what stands before the entries of a system in the legend: its label, or its own name if it has one."""
+    name = system.name
+    made_up = name is None or (name.startswith("sys[") and name.endswith("]"))
+    text = label if label is not None else "" if made_up else name_from_label(name)
+    return f"{plain(text)}: " if text else ""
+
+
+def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
+    """Draw light grid lines, or none."""
+    for ax in axes:
+        ax.grid(visible=on, which="major", color="0.85", linewidth=0.7)
+        ax.set_axisbelow(True)
+
+
+def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
+    """Put a legend above the axes where it covers no data: the figure's if it is our own, else the first axes'.
+
+    Lines with the same text and look stand in it once; there is none for fewer than two entries.
+    """
+    figure = axes[0, 0].figure
+    ours = [legend for legend in figure.legends if legend.get_gid() == LEGEND]
+    entries: dict[tuple[object, ...], Line2D] = {}
+    for line in [line for ax in axes.flat for line in ax.get_lines()]:
+        look = (line.get_label(), line.get_color(), line.get_linestyle(), line.get_marker())
+        if not str(line.get_label()).startswith("_"):
+            entries.setdefault(look, line)
+    if len(entries) < 2:  # noqa: PLR2004
+        return None
+    lines = list(entries.values())
+    longest = max(len(str(line.get_label())) for line in lines) + 5
+    for_figure = own or bool(ours)
+    width = figure.bbox.width / figure.dpi * (1.0 if for_figure else axes[0, 0].get_position().width)
+    style: dict[str, Any] = {
+        "handles": lines,
+        "ncols": int(np.clip(LEGEND_CHARACTERS * width // longest, 1, len(lines))),
+        "fontsize": "small",
+        "frameon": False,
+    }
+    for legend in ours:
+        legend.remove()
+    if for_figure:
+        legend = figure.legend(loc="outside upper center", **style)
+        legend.set_gid(LEGEND)
+        return legend
+    return axes[0, 0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **style)
+
+
+def draw_title(axes: AxesArray, title: str | None, *, own: bool) -> None:
+    """Put a title above a figure of our own, or above the first of given axes."""
+    if title is None:
+        return
+    if own:
+        axes[0, 0].figure.suptitle(title, fontsize="medium")
+    else:
+        legend = axes[0, 0].get_legend()
+        axes[0, 0].set_title(title, fontsize="medium", pad=6.0 if legend is None else 12.0 * _legend_rows(legend) + 9.0)
+
+
+def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> dict[str, str]:
+    """Give the units of the signals that have one, by name.
+
+    Parameters
+    ----------
+    system : control.StateSpace or SecondOrderModel
+    units : mapping from name to unit, optional
+        For a DOF the unit of its displacement, from which those of its derivatives and its force follow;
+        for any other signal its own.
+
+    Raises
+    ------
+    SignalNameError
+        A unit for a signal that the system does not have.
+    """
+    given = dict(units or {})
+    known: dict[str, str | None] = {}
+    if isinstance(system, SecondOrderModel):
+        names: set[str] = {*system.inputs, *system.outputs}
+        for dof, *motions, force in zip(
+            system.dofs, *(motion_names(system.dofs, k) for k in range(3)), force_names(system.dofs), strict=True
+        ):
+            unit = given.get(dof, "m")
+            known |= dict(zip(motions, (unit, f"{unit}/s", f"{unit}/s^2"), strict=True))
+            known[force] = FORCE_UNITS.get(unit)
+    else:
+        names = {name_from_label(label) for label in (*system.input_labels, *system.output_labels)}
+    for name in given:
+        if name not in names and name not in known:
+            raise unknown_name_error(name, "signal", sorted(names | set(known)))
+    return {name: unit for name, unit in (known | given).items() if unit}
+
+
+def signal_label(name: str, units: Mapping[str, str]) -> str:
+    """Write a signal with its unit, as far as it is known.
+
+    >>> signal_label("y_ddot", {"y_ddot": "m/s^2"})
+    'y_ddot [m/s²]'
+    """
+    return plain(name) + (f" [{typeset(units[name])}]" if name in units else "")
+
+
+def ratio_label(output: str, source: str, units: Mapping[str, str], *, dB: bool, newline: bool) -> str:
+    """Write the magnitude of a transfer function with its unit.
+
+    >>> ratio_label("y_dot", "F_y", {"y_dot": "m/s", "F_y": "N"}, dB=False, newline=False)
+    '|y_dot/F_y| [(m/s)/N]'
+    """
+    name = f"|{plain(output)}/{plain(source)}|"
+    unit = ""
+    if output in units and source in units:
+        over, under = units[output], units[source]
+        over = f"({over})" if set(over) & set("/ ") else over
+        under = f"({under})" if set(under) & set("/ ") else under
+        unit = "-" if over == under else f"{over}/{under}"
+    if dB:
+        unit = f"dB re 1 {unit}" if unit not in {"", "-"} else "dB"
+    return name + (("\n" if newline else " ") + f"[{typeset(unit)}]" if unit else "")
+
+
+def plain(name: str) -> str:
+    """Write a name so that matplotlib does not read it as mathematics."""
+    return name.replace("$", r"\$")
+
+
+def typeset(unit: str) -> str:
+    """Write powers in a unit as superscripts.
+
+    >>> typeset("m/s^2")
+    'm/s²'
+    """
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def _legend_rows(legend: Legend) -> int:
+    columns = max(1, int(getattr(legend, "_ncols", 1)))
+    return -(-len(legend.get_texts()) // columns)

@@ -1,0 +1,459 @@
+"""Linear quadratic regulators with weights on physical quantities.
+
+The cost of the feedback u = -K x on a reduced model is
+
+    J = integral of  sum_d w_d q_d^2 + sum_d v_d q'_d^2 + sum_d a_d q''_d^2 + e E + sum_j r_j u_j^2   dt,
+    E = 1/2 q'^T M q' + 1/2 q^T K q                                                        (12)
+
+Every quantity is C x + D u with the direct term of (4), so each weight w adds w C^T C to Q, w C^T D to N and
+w D^T D to R; half and static DOFs are weighted like any other. `control.lqr` solves the Riccati equation; what it
+returns is accepted only if the closed loop is stable.
+
+A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is the second-order model
+
+    M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
+"""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import control
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, checked_matrix, read_only
+from halfdof_ctrl.errors import ImproperError, StabilizationError, WeightError
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.reduction import ExactReduction, exact_reduction
+from halfdof_ctrl.spectrum import balanced, eigenvalues_and_rounding
+from halfdof_ctrl.statespace import labelled_system, mech2ss
+
+Weights: TypeAlias = Mapping[str, float] | None
+
+INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
+UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
+MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cost:
+    """``x^T Q x + u^T R u + 2 x^T N u``, for N states and m inputs."""
+
+    Q: FloatArray  #: (N, N)
+    R: FloatArray  #: (m, m)
+    N: FloatArray  #: (N, m)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class StateFeedback:
+    """A stabilizing feedback ``u = -K x`` on a reduced model, for N states and m inputs."""
+
+    model: SecondOrderModel  #: the open loop
+    reduction: ExactReduction  #: the open loop, reduced
+    cost: Cost  #: what was minimized
+    K: FloatArray  #: (m, N) gain
+    S: FloatArray  #: (N, N) solution of the Riccati equation: the cost from x is x^T S x
+    closed_loop: control.StateSpace  #: from the model's inputs to its outputs, with the feedback
+    poles: ComplexArray  #: (N,) of the closed loop [rad/s]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the rows of K."""
+        return self.model.inputs
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the columns of K."""
+        return self.reduction.states
+
+    def as_mechss(self) -> SecondOrderModel:
+        """Give the closed loop as a second-order model, equation (13).
+
+        Its finite eigenvalues are the closed-loop poles, which checks the design without the reduction.
+
+        Raises
+        ------
+        WeightError
+            Derivatives of the inputs act on the model (`Bv`, `Ba`), so that the state is not a function of
+            q and q' alone.
+        """
+        if self.reduction.shift:
+            msg = (
+                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (Bv, "
+                "Ba): the closed loop is no second-order model of the same form. Use `closed_loop`."
+            )
+            raise WeightError(msg, names=self.inputs)
+        from_q, from_v = _state_from_motion(self.reduction)
+        model, K = self.model, self.K
+        return replace(
+            model,
+            C=read_only(model.C + model.B @ K @ from_v),
+            K=read_only(model.K + model.B @ K @ from_q),
+            F=read_only(model.F - model.D @ K @ from_q),
+            G=read_only(model.G - model.D @ K @ from_v),
+            name=self.closed_loop.name,
+        )
+
+    def __repr__(self) -> str:
+        """Print the gain with its labels and the closed-loop poles."""
+        width = max(11, *(len(state) + 1 for state in self.states))
+        first = max(len(name) for name in self.inputs)
+        lines = [f"StateFeedback u = -K x, {len(self.inputs)} x {len(self.states)}"]
+        lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
+        for name, row in zip(self.inputs, self.K, strict=True):
+            lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
+        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        return "\n".join([*lines, f"  closed-loop poles: {poles}"])
+
+
+def lqr(
+    model: SecondOrderModel,
+    Q: npt.ArrayLike | None = None,
+    R: npt.ArrayLike | None = None,
+    N: npt.ArrayLike | None = None,
+    *,
+    displacement: Weights = None,
+    velocity: Weights = None,
+    acceleration: Weights = None,
+    effort: Weights = None,
+    energy: float | None = None,
+    method: Literal["slycot", "scipy"] | None = None,
+) -> StateFeedback:
+    """Design a linear quadratic regulator for a mechanical model.
+
+    Give either matrices or physical weights. A useful first choice of a weight is one over the square of the
+    largest value that is acceptable (Bryson's rule).
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Its inputs are the actuators; choose them with `select`.
+    Q, R, N : (N, N), (m, m), (N, m) array_like, optional
+        Weights of ``x^T Q x + u^T R u + 2 x^T N u``, as in `control.lqr`, on the states of `exact_reduction`.
+    displacement, velocity, acceleration : mapping from DOF to weight, optional
+        Weights of the squares of any DOF's motion [1/m^2, s^2/m^2, s^4/m^2], none negative.
+    effort : mapping from input to weight, optional
+        Weights of the squares of the inputs [1/N^2], positive.
+    energy : float, optional
+        Weight of the total mechanical energy, kinetic and elastic [1/J].
+    method : {"slycot", "scipy"}, optional
+        Solver, as in `control.lqr`.
+
+    Returns
+    -------
+    StateFeedback
+        The gain with its labels, the closed loop, and the way back to a second-order model.
+
+    Raises
+    ------
+    WeightError
+        Weights that are negative or not finite, an input without a weight, a cost that is not positive
+        semidefinite, the energy of a model without one (unsymmetric or indefinite M or K), or a
+        quantity that follows the derivative of an input.
+    SignalNameError
+        A weight on a DOF or input that is not there.
+    StabilizationError
+        No stabilizing gain: a mode on or right of the imaginary axis that the inputs do not reach, or one on
+        the axis that the cost does not see.
+
+    Examples
+    --------
+    For a mass of 1 kg, weights 1 on displacement and force give the gains 1 and sqrt(2):
+
+    >>> model = mechss([[1]], [[0]], [[0]], dofs="y")
+    >>> lqr(model, displacement={"y": 1}, effort={"F_y": 1}).K.round(6).tolist()
+    [[1.0, 1.414214]]
+    """
+    physical = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+    reduction = exact_reduction(model)
+    if Q is not None or R is not None or N is not None:
+        if effort is not None or energy is not None or any(weights is not None for weights in physical.values()):
+            msg = "Give either the matrices Q, R, N or physical weights, not both."
+            raise WeightError(msg, names=("Q", "R", "N"))
+        cost = _given_cost(Q, R, N, reduction)
+    else:
+        cost = _physical_cost(reduction, list(physical.values()), effort, energy)
+    plant = mech2ss(reduction)
+    gain, riccati = _solved(reduction, cost, method)
+    A, B = reduction.A, reduction.B
+    closed = labelled_system(
+        A - B @ gain,
+        B,
+        plant.C - plant.D @ gain,
+        plant.D,
+        states=reduction.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=f"{model.name}_lqr" if model.name else None,
+    )
+    return StateFeedback(
+        model=model,
+        reduction=reduction,
+        cost=cost,
+        K=read_only(gain),
+        S=read_only(riccati),
+        closed_loop=closed,
+        poles=_eigenvalues(A - B @ gain),
+    )
+
+
+def _given_cost(
+    Q: npt.ArrayLike | None, R: npt.ArrayLike | None, N: npt.ArrayLike | None, reduction: ExactReduction
+) -> Cost:
+    """Check weighting matrices that were given."""
+    n, m = reduction.B.shape
+    if Q is None or R is None:
+        msg = "Q and R are both needed where matrices are given; physical weights need neither."
+        raise WeightError(msg, names=("Q",) if Q is None else ("R",))
+    cost = Cost(
+        checked_matrix(Q, "Q", (n, n)),
+        checked_matrix(R, "R", (m, m)),
+        np.zeros((n, m)) if N is None else checked_matrix(N, "N", (n, m)),
+    )
+    for letter, matrix in (("Q", cost.Q), ("R", cost.R), ("N", cost.N)):
+        if np.iscomplexobj(matrix) or (letter != "N" and not _is_symmetric(matrix)):
+            kind = "real" if letter == "N" else "real and symmetric"
+            msg = f"{letter} must be {kind}: take its symmetric part if that is what is meant."
+            raise WeightError(msg, names=(letter,))
+    _require_convex(cost, reduction.model.inputs)
+    return cost
+
+
+def _physical_cost(reduction: ExactReduction, motions: list[Weights], effort: Weights, energy: float | None) -> Cost:
+    """Assemble Q, R and N from weights on motions, inputs and energy, equation (12)."""
+    model = reduction.model
+    n, m = reduction.B.shape
+    Q, R, N = np.zeros((n, n)), np.zeros((m, m)), np.zeros((n, m))
+    quantities: dict[str, float] = {}
+    for derivative, weights in enumerate(motions):
+        for dof, weight in _checked_weights(weights, model.dofs, "DOF"):
+            quantities[motion_names((dof,), derivative)[0]] = weight
+    parts = []
+    if quantities:
+        parts.append((*_weighted_rows(reduction, tuple(quantities)), np.diag(list(quantities.values()))))
+    if energy is not None:
+        parts += _energy_parts(reduction, _checked_weight("energy", energy))
+    for C, D, W in parts:
+        Q, N, R = Q + C.T @ W @ C, N + C.T @ W @ D, R + D.T @ W @ D
+    for name, weight in _checked_weights(effort, model.inputs, "input"):
+        R[model.inputs.index(name), model.inputs.index(name)] += weight
+    if not quantities and energy is None:
+        msg = "The cost sees no motion: weight a displacement, velocity, acceleration or the energy."
+        raise WeightError(msg, names=())
+    cost = Cost((Q + Q.T) / 2.0, (R + R.T) / 2.0, N)
+    _require_convex(cost, model.inputs)
+    return cost
+
+
+def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    """Give C and D of the named motions."""
+    try:
+        system = mech2ss(replace(reduction, model=reduction.model.select(outputs=names)))
+    except ImproperError as cause:
+        culprits = tuple(dict.fromkeys(output for _, output, _ in cause.pairs))
+        msg = (
+            f"{listed(culprits)} follows the derivative of an input, so that no weight on its square makes a quadratic "
+            "cost of states and inputs. Weight the displacement instead."
+        )
+        raise WeightError(msg, names=culprits) from cause
+    return np.asarray(system.C), np.asarray(system.D)
+
+
+def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Give the rows and weights of the kinetic and the elastic energy."""
+    model, part = reduction.model, reduction.partition
+    for letter, matrix in (("M", model.M), ("K", model.K)):
+        if not _is_symmetric(matrix) or _smallest_eigenvalue(matrix) < -INDEFINITE:
+            msg = (
+                f"{letter} is not symmetric positive semidefinite, so that the model has no mechanical energy of the "
+                "usual form. Weight displacements and velocities instead."
+            )
+            raise WeightError(msg, names=("energy",))
+    if reduction.shift:
+        msg = "The energy of a model on which derivatives of inputs act (Bv, Ba) is no function of its states alone."
+        raise WeightError(msg, names=("energy",))
+    n, m = reduction.B.shape
+    velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    displacement = reduction.displacement
+    return [
+        (velocity, np.zeros((len(model.dofs), m)), 0.5 * weight * model.M),
+        (displacement.X, displacement.direct(m), 0.5 * weight * model.K),
+    ]
+
+
+def _checked_weights(weights: Weights, known: tuple[str, ...], what: str) -> Iterator[tuple[str, float]]:
+    for name, value in (weights or {}).items():
+        if name not in known:
+            raise unknown_name_error(name, what, known)
+        yield name, _checked_weight(name, value)
+
+
+def _checked_weight(name: str, value: float) -> float:
+    """Read one weight: a finite number that is not negative."""
+    if isinstance(value, bool | str) or not np.isreal(value) or not math.isfinite(value) or value < 0.0:
+        msg = f"The weight of {name} is {value!r}, but it must be a finite number that is not negative."
+        raise WeightError(msg, names=(name,))
+    return float(value)
+
+
+def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:
+    """Refuse R that is not positive definite and a cost that is not positive semidefinite."""
+    diagonal = np.diagonal(cost.R)
+    free = tuple([name for name, weight in zip(inputs, diagonal.tolist(), strict=True) if weight <= 0.0])
+    if free:
+        msg = (
+            f"The inputs {listed(free)} cost nothing, so that the gain would be infinite. Give each a positive effort."
+        )
+        raise WeightError(msg, names=free)
+    if _smallest_eigenvalue(cost.R) <= INDEFINITE:
+        msg = f"R is not positive definite over the inputs {listed(inputs)}: some combination of them costs nothing."
+        raise WeightError(msg, names=inputs)
+    whole = np.block([[cost.Q, cost.N], [cost.N.T, cost.R]])
+    if _smallest_eigenvalue(whole) < -INDEFINITE:
+        msg = "The cost [[Q, N], [N', R]] is not positive semidefinite: it can be made as small as one likes."
+        raise WeightError(msg, names=("Q", "N", "R"))
+
+
+def _smallest_eigenvalue(matrix: FloatArray) -> float:
+    """Give the smallest eigenvalue after scaling the diagonal to one."""
+    scale = np.sqrt(np.abs(np.diagonal(matrix)))
+    scale = np.where(scale > 0.0, scale, max(scale.max(initial=0.0), 1.0))
+    return float(np.linalg.eigvalsh(matrix / scale / scale[:, None])[0])
+
+
+def _is_symmetric(matrix: FloatArray) -> bool:
+    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())
+
+
+def _solved(
+    reduction: ExactReduction, cost: Cost, method: Literal["slycot", "scipy"] | None
+) -> tuple[FloatArray, FloatArray]:
+    """Solve by `control.lqr` and accept the gain only if it stabilizes."""
+    A, B = reduction.A, reduction.B
+    _require_stabilizing_solution(reduction, cost)
+    try:
+        gain, riccati, _ = control.lqr(A, B, cost.Q, cost.R, cost.N, method=method)
+    except (ArithmeticError, ValueError) as cause:  # what the solvers raise where they find no gain
+        raise _unsolved_error(_eigenvalues(A)) from cause
+    gain, riccati = np.asarray(gain) + 0.0, np.asarray(riccati)
+    poles = _eigenvalues(A - B @ gain)
+    margin = MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
+    if not np.isfinite(gain).all() or (poles.real >= -margin).any():
+        raise _unsolved_error(poles)
+    return gain, riccati
+
+
+def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None:
+    """Refuse a mode that no feedback stabilizes or that the optimal one would leave on the axis.
+
+    A stabilizing solution of the Riccati equation exists if and only if every mode that is not stable is
+    reached by the inputs and no mode on the imaginary axis is hidden from the cost (K. Zhou, J. C. Doyle and
+    K. Glover, Robust and Optimal Control, theorem 13.7).
+    """
+    A, B = reduction.A, reduction.B
+    cross = np.linalg.solve(cost.R, cost.N.T)
+    for eigenvalue in _axis_eigenvalues(A, right_too=True):
+        mode = _null_vector(A.T, B.T, eigenvalue)
+        if mode is not None:
+            force = _best_force(reduction, mode)
+            msg = (
+                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and no input reaches it, so that no feedback "
+                f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
+            )
+            raise StabilizationError(msg, eigenvalue=eigenvalue, quantity=f"F_{force}")
+    for eigenvalue in _axis_eigenvalues(A - B @ cross, right_too=False):
+        mode = _null_vector(A - B @ cross, cost.Q - cost.N @ cross, eigenvalue)
+        if mode is not None:
+            kind, dof = _largest_motion(reduction, mode)
+            msg = (
+                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost does not see it, so that the "
+                f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
+            )
+            raise StabilizationError(
+                msg, eigenvalue=eigenvalue, quantity=motion_names((dof,), int(kind == "velocity"))[0]
+            )
+
+
+def _axis_eigenvalues(A: FloatArray, *, right_too: bool) -> list[complex]:
+    """List the eigenvalues on the imaginary axis, to what rounding in A tells, or also right of it.
+
+    Those within rounding of the axis or of zero are moved there, since a double eigenvalue is known to half
+    the digits only.
+    """
+    values, known_to = eigenvalues_and_rounding(A)
+    found = []
+    for value, error in zip(values.tolist(), known_to.tolist(), strict=True):
+        if abs(value) <= error:
+            found.append(0j)
+        elif abs(value.real) <= error:
+            found.append(complex(0.0, value.imag))
+        elif right_too and value.real > 0.0:
+            found.append(value)
+    return found
+
+
+def _unsolved_error(poles: ComplexArray) -> StabilizationError:
+    """Make the refusal where the solver failed although a gain exists."""
+    worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    msg = (
+        f"The solver found no stabilizing gain, although one exists: a pole stays at {_in_words(worst)} rad/s. The "
+        "weights may differ by too many powers of ten; bring Q and R closer together."
+    )
+    return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
+
+
+def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
+    """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
+    matrix, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+    shown = C * scale
+    size = np.abs(shown).max(axis=1, keepdims=True)
+    shown = shown / np.where(size > 0.0, size, 1.0) * np.linalg.norm(matrix, 2)
+    stack = np.vstack([matrix - eigenvalue * np.eye(A.shape[0]), shown])
+    _, values, right = np.linalg.svd(stack)
+    if values[-1] > UNREACHED * values[0]:
+        return None
+    return np.asarray(scale * right[-1].conj())
+
+
+def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
+    """Name the DOF whose force drives a left eigenvector most."""
+    partition = reduction.partition
+    driven = np.abs(
+        mode[partition.n_inertial : partition.n_inertial + partition.n_half] @ reduction.alpha
+        + mode[partition.n_inertial + partition.n_half :] @ reduction.gamma
+    )
+    return reduction.model.dofs[int(np.argmax(driven))]
+
+
+def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str, str]:
+    """Say in the displacement or velocity of which DOF a mode shows most, displacements first."""
+    shares = [np.abs(reduction.motion(derivative).X @ mode) for derivative in range(2)]
+    derivative = 0 if shares[0].max() > UNREACHED * shares[1].max() else 1
+    return ("displacement", "velocity")[derivative], reduction.model.dofs[int(np.argmax(shares[derivative]))]
+
+
+def _state_from_motion(reduction: ExactReduction) -> tuple[FloatArray, FloatArray]:
+    """Give L_q and L_v of x = L_q q + L_v q'."""
+    part = reduction.partition
+    n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+    to_coordinates = part.to_coordinates(np.eye(len(reduction.model.dofs)))
+    from_q, from_v = np.zeros((2, reduction.order, to_coordinates.shape[1]))
+    from_q[:moving] = to_coordinates[:moving]
+    from_v[moving:] = to_coordinates[:n_i]
+    return from_q, from_v
+
+
+def _eigenvalues(A: FloatArray) -> ComplexArray:
+    return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
+
+
+def _in_words(value: complex) -> str:
+    """Write a pole with four digits, a pair as one."""
+    if abs(value.imag) <= UNREACHED * abs(value):
+        return f"{value.real:.4g}"
+    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"

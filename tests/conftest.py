@@ -1,0 +1,26 @@
+"""Surroundings of all tests: hypothesis profiles, and a way to run everything without slycot.
+
+``HYPOTHESIS_PROFILE=wide`` runs 1000 random examples a property instead of 50; both are derandomized, so a
+failure can be repeated. ``HALFDOF_WITHOUT_SLYCOT=1`` makes slycot unimportable before control is imported.
+"""
+
+import os
+import sys
+
+from hypothesis import HealthCheck, settings
+
+if os.environ.get("HALFDOF_WITHOUT_SLYCOT", "0") not in {"", "0"}:
+    if "control" in sys.modules or sys.modules.get("slycot") is not None:
+        msg = "control or slycot was imported before tests/conftest.py could block slycot."
+        raise RuntimeError(msg)
+    sys.modules["slycot"] = None  # type: ignore[assignment]  # an import of it fails from now on
+
+SLOW_DATA = [HealthCheck.too_slow, HealthCheck.data_too_large]  # a drawn model has some hundred entries
+
+settings.register_profile(
+    "default", derandomize=True, deadline=None, max_examples=50, database=None, suppress_health_check=SLOW_DATA
+)
+settings.register_profile(
+    "wide", derandomize=True, deadline=None, max_examples=1000, database=None, suppress_health_check=SLOW_DATA
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
