@@ -1,5 +1,6 @@
 """Checked, read-only matrices: the one place where shapes and entries are tested."""
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
 
@@ -15,6 +16,7 @@ Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matri
 DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
+PLAIN = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -53,14 +55,38 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
             f"{letter} must be {expected}, but it is {found}. Check its rows and columns against the DOFs and signals."
         )
         raise MatrixError(msg, matrix=letter)
-    if array.size == 0 and shape is None:
-        msg = f"{letter} is empty (0 x 0): a model needs at least one DOF."
+    if array.size == 0:
+        msg = f"{letter} is empty: a model needs at least one DOF, one input and one output."
         raise MatrixError(msg, matrix=letter)
     if not np.logical_and.reduce(np.isfinite(array), axis=None):
         row, column = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
         msg = f"{letter}[{row}, {column}] is {array[row, column]}: every entry must be a finite number."
         raise MatrixError(msg, matrix=letter)
     return read_only(array)
+
+
+def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matrix]:
+    """Copy square matrices of one size into read-only ones, as `checked_matrix` does; None becomes zeros.
+
+    Raises
+    ------
+    MatrixError
+        As in `checked_matrix`, or all are None.
+    """
+    if all([type(value) in PLAIN for value in values]):  # noqa: C419  # a list is faster for three
+        together = _stacked(values)
+        if together is not None:
+            return together
+    size: tuple[int, int] | None = None
+    checked: list[Matrix | None] = []
+    for letter, value in zip(letters, values, strict=True):
+        checked.append(None if value is None else checked_matrix(value, letter, size))
+        if size is None and checked[-1] is not None:
+            size = (checked[-1].shape[0], checked[-1].shape[1])
+    if size is None:
+        msg = f"{', '.join(letters)} are all None: a model needs at least one of them."
+        raise MatrixError(msg, matrix=letters[-1])
+    return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
 
 
 def zero_matrix(rows: int, columns: int) -> FloatArray:
@@ -94,6 +120,9 @@ def _numbers(value: object, letter: str) -> Matrix:
         array = np.array(value)
         if array.dtype == REAL:
             return array
+        if array.dtype.kind == "O" and any(isinstance(entry, str | bytes) for entry in array.flat):
+            msg = "it holds text"
+            raise TypeError(msg)  # noqa: TRY301  # told like the other conversions that fail
         if array.dtype.kind in "biufO":
             return array.astype(np.float64)
         if array.dtype.kind == "c":
@@ -103,6 +132,20 @@ def _numbers(value: object, letter: str) -> Matrix:
         raise MatrixError(msg, matrix=letter) from cause
     msg = f"{letter} holds entries of type {array.dtype} where numbers are needed. Convert them first."
     raise MatrixError(msg, matrix=letter)
+
+
+def _stacked(values: Sequence[object]) -> list[Matrix] | None:
+    """Copy real matrices in one piece, which is faster; None if anything about them wants a closer look."""
+    try:
+        stack = np.array(values)
+    except ValueError:  # of different shapes, to be told apart by checked_matrix
+        return None
+    if stack.dtype != REAL or stack.ndim != 1 + MATRIX_DIMENSIONS or stack.shape[1] != stack.shape[2] or not stack.size:
+        return None
+    if not np.logical_and.reduce(np.isfinite(stack), axis=None):
+        return None
+    stack.setflags(write=False)
+    return list(stack)
 
 
 def _dense(value: object, letter: str) -> object:

@@ -1,4 +1,4 @@
-"""What the plots share: axes to draw on, legends that cover no data, and labels with units.
+"""What the plots share: axes to draw on, a legend that covers no data, and labels with units.
 
 A signal's unit follows from the model: a DOF's displacement is in m, its derivatives in m/s and m/s^2, the
 force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
@@ -19,12 +19,13 @@ from halfdof_ctrl.errors import ParameterError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import force_names, motion_names, name_from_label, unknown_name_error
 
-AxesArray: TypeAlias = npt.NDArray[np.object_]
+AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
 AxesLike: TypeAlias = Axes | npt.ArrayLike | None
 Units: TypeAlias = Mapping[str, str] | None
 
 FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
 LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
+LEGEND_SIZE = 9.0  #: [pt]
 LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
 CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
 FORCE_UNITS = {"m": "N", "mm": "N", "rad": "N m", "m^3": "Pa"}  #: of the force on a DOF, by the DOF's unit
@@ -55,7 +56,7 @@ def prepared_axes(
     """
     rows, columns = shape
     if ax is None:
-        with plt.rc_context(control.config.defaults["ctrlplot.rcParams"]):
+        with plt.rc_context(control.config.defaults["ctrlplot.rcParams"] if columns > 1 else {}):
             _, axes = plt.subplots(
                 rows,
                 columns,
@@ -79,7 +80,7 @@ def prepared_axes(
     return given.reshape(shape)
 
 
-def no_lines(axes: AxesArray) -> npt.NDArray[np.object_]:
+def no_lines(axes: AxesArray) -> npt.NDArray[Any]:
     """Give an empty list for each of the axes."""
     lines = np.empty(axes.shape, dtype=object)
     for place in np.ndindex(axes.shape):
@@ -88,11 +89,24 @@ def no_lines(axes: AxesArray) -> npt.NDArray[np.object_]:
 
 
 def finished_plot(
-    lines: npt.NDArray[np.object_], axes: AxesArray, title: str | None, *, own: bool
+    lines: npt.NDArray[Any],
+    axes: AxesArray,
+    title: str | None,
+    system: control.StateSpace | SecondOrderModel,
+    *,
+    own: bool,
 ) -> control.ControlPlot:
-    """Add legend and title, and pack everything up. `own` tells that the figure was made here."""
+    """Add legend and title, and pack everything up.
+
+    `own` tells that the figure was made here: its title is by default the name of the system, if it has one.
+    """
     legend = draw_legend(axes, own=own)
-    draw_title(axes, title, own=own)
+    name = system.name or ""
+    made_up = name.startswith("sys[") and name.endswith("]")
+    if title is None and own and not made_up:
+        title = plain(name_from_label(name))
+    if title:
+        draw_title(axes, title, own=own)
     return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)
 
 
@@ -112,12 +126,15 @@ def require_system(sysdata: object) -> None:
         raise ParameterError(msg, parameter="sysdata", value=sysdata)
 
 
-def legend_prefix(label: str | None, system: control.StateSpace | SecondOrderModel) -> str:
-    """Give what stands before the entries of a system in the legend: its label, or its own name if it has one."""
-    name = system.name
-    made_up = name is None or (name.startswith("sys[") and name.endswith("]"))
-    text = label if label is not None else "" if made_up else name_from_label(name)
-    return f"{plain(text)}: " if text else ""
+def legend_prefix(label: str | None) -> str:
+    """Give what stands before the entries of a system in the legend."""
+    return f"{plain(label)}: " if label else ""
+
+
+def label_y(ax: Axes, text: str) -> None:
+    """Label the y axis, but keep a label that says the same and more (the unit, from a model drawn before)."""
+    if not ax.get_ylabel().startswith(text):
+        ax.set_ylabel(text)
 
 
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
@@ -128,9 +145,9 @@ def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
 
 
 def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
-    """Put a legend above the axes where it covers no data: the figure's if it is our own, else the first axes'.
+    """Put a legend where it covers no data: below a figure of our own, else above the first of the axes.
 
-    Lines with the same text and look stand in it once; there is none for fewer than two entries.
+    Lines with the same text and look stand in it once.
     """
     figure = axes[0, 0].figure
     ours = [legend for legend in figure.legends if legend.get_gid() == LEGEND]
@@ -139,7 +156,7 @@ def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
         look = (line.get_label(), line.get_color(), line.get_linestyle(), line.get_marker())
         if not str(line.get_label()).startswith("_"):
             entries.setdefault(look, line)
-    if len(entries) < 2:  # noqa: PLR2004
+    if not entries:
         return None
     lines = list(entries.values())
     longest = max(len(str(line.get_label())) for line in lines) + 5
@@ -148,27 +165,26 @@ def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
     style: dict[str, Any] = {
         "handles": lines,
         "ncols": int(np.clip(LEGEND_CHARACTERS * width // longest, 1, len(lines))),
-        "fontsize": "small",
+        "fontsize": LEGEND_SIZE,
         "frameon": False,
     }
-    for legend in ours:
-        legend.remove()
+    for old in ours:
+        old.remove()
     if for_figure:
-        legend = figure.legend(loc="outside upper center", **style)
+        legend: Legend = figure.legend(loc="outside lower center", **style)
         legend.set_gid(LEGEND)
         return legend
-    return axes[0, 0].legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **style)
+    first: Axes = axes[0, 0]
+    return first.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **style)
 
 
-def draw_title(axes: AxesArray, title: str | None, *, own: bool) -> None:
+def draw_title(axes: AxesArray, title: str, *, own: bool) -> None:
     """Put a title above a figure of our own, or above the first of given axes."""
-    if title is None:
-        return
     if own:
         axes[0, 0].figure.suptitle(title, fontsize="medium")
     else:
         legend = axes[0, 0].get_legend()
-        axes[0, 0].set_title(title, fontsize="medium", pad=6.0 if legend is None else 12.0 * _legend_rows(legend) + 9.0)
+        axes[0, 0].set_title(title, fontsize="medium", pad=6.0 if legend is None else 14.0 * _legend_rows(legend) + 8.0)
 
 
 def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> dict[str, str]:
@@ -197,11 +213,21 @@ def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> 
             known |= dict(zip(motions, (unit, f"{unit}/s", f"{unit}/s^2"), strict=True))
             known[force] = FORCE_UNITS.get(unit)
     else:
-        names = {name_from_label(label) for label in (*system.input_labels, *system.output_labels)}
+        names = {name for side in signal_names(system) for name in side}
     for name in given:
         if name not in names and name not in known:
             raise unknown_name_error(name, "signal", sorted(names | set(known)))
     return {name: unit for name, unit in (known | given).items() if unit}
+
+
+def signal_names(system: control.StateSpace | SecondOrderModel) -> tuple[list[str], list[str]]:
+    """Give the names of the outputs and of the inputs, as the model has them."""
+    if isinstance(system, SecondOrderModel):
+        return list(system.outputs), list(system.inputs)
+    outputs, inputs = (
+        [name_from_label(label) for label in labels] for labels in (system.output_labels, system.input_labels)
+    )
+    return outputs, inputs
 
 
 def signal_label(name: str, units: Mapping[str, str]) -> str:

@@ -19,26 +19,36 @@ from halfdof_ctrl.axes import (
     draw_grid,
     finished_plot,
     known_units,
+    label_y,
     legend_prefix,
     no_lines,
     plain,
     prepared_axes,
     ratio_label,
     require_system,
+    signal_names,
 )
 from halfdof_ctrl.descriptor import require_regular
-from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.errors import (
+    ComplexModelError,
+    HalfdofError,
+    ImproperError,
+    ParameterError,
+    SingularLeadingMatrixError,
+)
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import name_from_label
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
 PEAK_MARKS = 6  #: markers on the highest peaks besides
+CLOSE = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 HALF_TURN = 1e-6  #: [rad] a jump of the phase this close to pi comes from an undamped pole or zero
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
-NO_STATE_SPACE = {
+USUAL = 95.0  #: [%] of the points of a curve lie in the range that is shown in any case
+SPIKE = 1e5  #: a peak higher than this times that range is cut
+NO_STATE_SPACE: dict[type[HalfdofError], str] = {
     ComplexModelError: "model is complex",
     ImproperError: "improper",
     SingularLeadingMatrixError: "W is singular",
@@ -101,9 +111,9 @@ def bode_plot(
     grid : bool
         Draw grid lines.
     title : str, optional
-        Above the figure, or above the first of the given axes.
+        Above the figure, by default the name of the system; or above the first of the given axes.
     label : str, optional
-        Name of the system in the legend, by default its own.
+        Stands before the entries of the legend, to tell systems on the same axes apart.
     units : mapping from signal to unit, optional
         Where they are not m, m/s, m/s^2 and N: ``{"phi": "rad"}``, also for the velocity, acceleration
         and moment of that DOF. Signals that are no motions or forces of the model's DOFs have no unit without it.
@@ -139,9 +149,13 @@ def bode_plot(
     p, m = curve.noutputs, curve.ninputs
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
-    lines, scales, prefix = no_lines(axes), _Scales(dB, Hz, deg), legend_prefix(label, sysdata)
+    lines, scales, prefix = no_lines(axes), _Scales(dB, Hz, deg), legend_prefix(label)
     values, marks = np.asarray(curve.frdata), _marked(curve)
-    exact = None if reference is None else np.asarray(descriptor_response(reference, curve.omega[marks]).frdata)
+    exact = (
+        None
+        if reference is None or marks.size == 0
+        else np.asarray(descriptor_response(reference, curve.omega[marks]).frdata)
+    )
     for i, j in product(range(p), range(m)):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
         phase = continuous_phase(values[i, j])
@@ -154,8 +168,8 @@ def bode_plot(
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
             lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(_on_branch(exact[i, j], phase[marks])), **style)
     named = sysdata if reference is None else reference
-    _dress(axes, curve, known_units(named, units), scales, grid=grid)
-    return finished_plot(lines, axes, title, own=ax is None)
+    _dress(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
+    return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 
 def continuous_phase(values: ComplexArray) -> FloatArray:
@@ -169,8 +183,9 @@ def continuous_phase(values: ComplexArray) -> FloatArray:
     Returns
     -------
     (k,) ndarray
-        ``numpy.angle`` plus whole turns. The first value lies in (-pi, pi]; a half turn is taken downwards
-        where the magnitude rises into it (a pole), else upwards (a zero).
+        ``numpy.angle`` plus whole turns. The first value lies in [-pi, pi], a negative real one at pi
+        where the magnitude rises (a zero at the origin), else at -pi; a half turn is taken downwards
+        where the magnitude rises into it (an undamped pole), else upwards (a zero).
 
     Examples
     --------
@@ -182,7 +197,8 @@ def continuous_phase(values: ComplexArray) -> FloatArray:
     if there.size == 0:
         return angle
     known, size = angle[there], np.abs(values[there])
-    known = np.where(known <= HALF_TURN - np.pi, known + 2.0 * np.pi, known)
+    if np.pi - np.abs(known[0]) < HALF_TURN and (known[0] > 0.0) != (size[1:2] > size[0]).any():
+        known[0] = -known[0]
     jumps = np.mod(np.diff(known) + np.pi, 2.0 * np.pi) - np.pi
     half = np.pi - np.abs(jumps) < HALF_TURN
     rising = np.diff(size[:-1], prepend=0.0) >= 0.0
@@ -204,7 +220,7 @@ def _curve(
         except tuple(NO_STATE_SPACE) as error:
             kind = f"descriptor form (no state space: {NO_STATE_SPACE[type(error)]})"
             return descriptor_response(sysdata, omega), kind, reference
-        reference = reference or sysdata
+        reference = sysdata if reference is None else reference
     else:
         sys = sysdata
     curve = frequency_response(sys, omega)
@@ -221,10 +237,11 @@ def _curve(
 
 def _marked(curve: control.FrequencyResponseData) -> npt.NDArray[np.intp]:
     """Choose frequencies for markers: spread evenly on the logarithmic axis, and the highest peaks."""
-    omega, size = np.asarray(curve.omega), np.abs(np.asarray(curve.frdata)).reshape(-1, curve.omega.size)
+    omega = np.asarray(curve.omega, dtype=float)
+    size = np.abs(np.asarray(curve.frdata)).reshape(-1, omega.size)
     usable = np.flatnonzero((omega > 0.0) & np.isfinite(size).all(axis=0))
     if usable.size <= MARKS:
-        return usable
+        return np.asarray(usable)
     frequencies, size = np.log(omega[usable]), size[:, usable]
     wanted = np.linspace(frequencies[0], frequencies[-1], MARKS)
     spread = np.abs(frequencies[:, None] - wanted).argmin(axis=0)
@@ -232,39 +249,60 @@ def _marked(curve: control.FrequencyResponseData) -> npt.NDArray[np.intp]:
         size = size / size.max(axis=1, keepdims=True)
     inner = size[:, 1:-1]
     peaks = np.where((inner > size[:, :-2]) & (inner > size[:, 2:]), inner, 0.0).max(axis=0)
-    highest = np.argsort(-peaks, kind="stable")[:PEAK_MARKS]
-    return usable[np.union1d(spread, 1 + highest[peaks[highest] > 0.0])]
+    highest: list[int] = []
+    for k in (1 + np.argsort(-peaks, kind="stable")[: np.count_nonzero(peaks)]).tolist():
+        if len(highest) < PEAK_MARKS and all(abs(frequencies[k] - frequencies[other]) > CLOSE for other in highest):
+            highest.append(k)
+    return np.asarray(usable[np.union1d(spread, np.array(highest, dtype=np.intp))])
 
 
 def _on_branch(values: ComplexArray, phase: FloatArray) -> FloatArray:
     """Give the phase of values on the turn nearest to a given one."""
-    angle = np.angle(values)
+    angle = np.where(values == 0.0, np.nan, np.angle(values))
     turns = np.round((phase - angle) / (2.0 * np.pi))
     return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
 
 
 def _dress(
-    axes: AxesArray, curve: control.FrequencyResponseData, units: dict[str, str], scales: _Scales, *, grid: bool
+    axes: AxesArray,
+    curve: control.FrequencyResponseData,
+    system: control.StateSpace | SecondOrderModel,
+    units: dict[str, str],
+    scales: _Scales,
+    *,
+    grid: bool,
 ) -> None:
     """Set scales, labels, ticks and grid of all axes."""
-    outputs = [name_from_label(label) for label in curve.output_labels]
-    inputs = [name_from_label(label) for label in curve.input_labels]
+    outputs, inputs = signal_names(system)
     for i, j in product(range(len(outputs)), range(len(inputs))):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
-        above.set_xscale("log")
-        below.set_xscale("log")
-        if not scales.dB:
-            above.set_yscale("log")
-        above.set_ylabel(ratio_label(outputs[i], inputs[j], units, dB=scales.dB, newline=axes.size > 2))  # noqa: PLR2004
+        if (np.asarray(curve.omega) > 0.0).any():
+            above.set_xscale("log")
+            below.set_xscale("log")
+        label_y(above, ratio_label(outputs[i], inputs[j], units, dB=scales.dB, newline=axes.size > 2))  # noqa: PLR2004
         below.set_ylabel("phase [deg]" if scales.deg else "phase [rad]")
         if scales.deg:
             _set_phase_ticks(below)
         if not np.asarray(curve.frdata)[i, j].any():
-            above.text(0.5, 0.5, f"{plain(outputs[i])} does not respond", transform=above.transAxes, ha="center")
+            above.text(0.5, 0.75, f"{plain(outputs[i])} does not respond", transform=above.transAxes, ha="center")
+        elif not scales.dB:
+            _set_logarithmic(above)
         draw_grid([above, below], on=grid)
     for ax in axes[-1]:
         ax.set_xlabel("frequency [Hz]" if scales.Hz else "frequency [rad/s]")
     axes[0, 0].figure.align_ylabels(list(axes.flat))
+
+
+def _set_logarithmic(ax: Axes) -> None:
+    """Make the magnitude's axis logarithmic; undamped resonances leave it at the top and do not flatten the rest."""
+    curve = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
+    curve = curve[np.isfinite(curve) & (curve > 0.0)]
+    if curve.size == 0:
+        return
+    ax.set_yscale("log")
+    usual = float(np.percentile(curve, USUAL))
+    if ax.dataLim.y1 > SPIKE * usual:
+        ax.set_ylim(top=np.sqrt(SPIKE) * usual)
 
 
 def _set_phase_ticks(ax: Axes) -> None:

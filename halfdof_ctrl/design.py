@@ -122,7 +122,7 @@ def lqr(
     acceleration: Weights = None,
     effort: Weights = None,
     energy: float | None = None,
-    method: Literal["slycot", "scipy"] | None = None,
+    method: Literal["scipy", "slycot"] = "scipy",
 ) -> StateFeedback:
     """Design a linear quadratic regulator for a mechanical model.
 
@@ -141,8 +141,9 @@ def lqr(
         Weights of the squares of the inputs [1/N^2], positive.
     energy : float, optional
         Weight of the total mechanical energy, kinetic and elastic [1/J].
-    method : {"slycot", "scipy"}, optional
-        Solver, as in `control.lqr`.
+    method : {"scipy", "slycot"}, optional
+        Solver, as in `control.lqr`. scipy's balances what the units of mechanics spread over many powers of
+        ten, and gives the same digits whether or not slycot is there.
 
     Returns
     -------
@@ -330,9 +331,7 @@ def _is_symmetric(matrix: FloatArray) -> bool:
     return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())
 
 
-def _solved(
-    reduction: ExactReduction, cost: Cost, method: Literal["slycot", "scipy"] | None
-) -> tuple[FloatArray, FloatArray]:
+def _solved(reduction: ExactReduction, cost: Cost, method: Literal["scipy", "slycot"]) -> tuple[FloatArray, FloatArray]:
     """Solve by `control.lqr` and accept the gain only if it stabilizes."""
     A, B = reduction.A, reduction.B
     _require_stabilizing_solution(reduction, cost)

@@ -4,6 +4,7 @@ A message states the measured fact, the DOF or signal by name, what it means phy
 The attributes repeat the facts for programs.
 """
 
+import sys
 from collections.abc import Callable
 
 
@@ -126,6 +127,14 @@ class FileFormatError(HalfdofError):
     def __init__(self, message: str, *, path: str) -> None:
         super().__init__(message)
         self.path = path
+
+
+def callers_level() -> int:
+    """Give the `stacklevel` of a warning that is to point at the first line outside this package."""
+    frame, level = sys._getframe(1), 1  # noqa: SLF001  # the way that the standard library goes too
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 class NearlyMasslessWarning(UserWarning):

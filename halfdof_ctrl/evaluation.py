@@ -39,7 +39,10 @@ def quadratic_transfer(
     for start in range(0, points.size, batch):
         part = points[start : start + batch]
         states = _solved(_polynomial(P, part), _polynomial(B, part))
-        values[:, :, start : start + batch] = np.moveaxis(_polynomial(F, part) @ states + _polynomial(D, part), 0, 2)
+        with np.errstate(invalid="ignore"):
+            response = _polynomial(F, part) @ states + _polynomial(D, part)
+        response[~np.isfinite(states).all(axis=(1, 2))] = complex(np.inf, np.nan)
+        values[:, :, start : start + batch] = np.moveaxis(response, 0, 2)
     return values
 
 
@@ -62,14 +65,15 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
         residual = right - scaled @ solution
         size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
         coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
-    if coarse.any():
-        solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
-    return np.asarray(np.swapaxes(columns, 1, 2) * solution, dtype=np.complex128)
+        if coarse.any():
+            solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
+        solution *= np.swapaxes(columns, 1, 2)
+    return solution
 
 
 def _solve_each(P: ComplexArray, B: ComplexArray) -> ComplexArray:
     try:
-        return np.linalg.solve(P, B)
+        return np.asarray(np.linalg.solve(P, B), dtype=np.complex128)
     except np.linalg.LinAlgError:  # one of the stack is exactly singular: that one is infinite
         if P.shape[0] == 1:
             return np.full(B.shape, complex(np.inf, np.nan))

@@ -212,12 +212,24 @@ def replacing(path: PathLike) -> Iterator[BinaryIO]:
         raise FileFormatError(msg, path=str(path))
     temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
     try:
-        with temporary.open("xb") as stream:
+        with naming_target(path):
+            stream = temporary.open("xb")
+        with stream:
             yield stream
-        temporary.replace(target)
+        with naming_target(path):
+            temporary.replace(target)
     except BaseException:
         temporary.unlink(missing_ok=True)
         raise
+
+
+@contextmanager
+def naming_target(path: PathLike) -> Iterator[None]:
+    """Let an OSError tell of the target instead of a temporary name."""
+    try:
+        yield
+    except OSError as cause:
+        raise OSError(cause.errno, cause.strerror, str(path)) from cause
 
 
 def _save_matrices(path: PathLike, content: Content, names: Mapping[str, Sequence[str]], name: str | None) -> None:
@@ -285,7 +297,7 @@ def _load_matrices(path: PathLike, wanted: Sequence[str]) -> Content:
     """Read the wanted variables of a file; whatever a damaged file does to the readers is one refusal."""
     read = _read_npz if ending(path, MATRIX_ENDINGS) == ".npz" else read_mat
     if Path(path).exists() and not Path(path).is_file():
-        msg = f"{path}: this is no file. Give a model file that ends in {' or '.join(MATRIX_ENDINGS)}."
+        msg = f"{path}: this is no file. Give a file that ends in {' or '.join(MATRIX_ENDINGS)}."
         raise FileFormatError(msg, path=str(path))
     content = Path(path).read_bytes()
     with _naming_the_file(path):

@@ -73,7 +73,7 @@ def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray
         raise ParameterError(msg, parameter="horizon", value=horizon)
     moving = values[np.abs(values) > INTEGRATOR * np.abs(values).max(initial=0.0)]
     end = _default_horizon(moving) if horizon is None else float(horizon)
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         seen = np.abs(moving[SETTLED / np.abs(moving.real) > end / SEEN])
     fastest = float(seen.max(initial=0.0))
     if horizon is None and end * fastest > COARSE * MOST_STEPS:
@@ -108,10 +108,10 @@ def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.
     if A.size == 0:
         return np.zeros(0, dtype=np.complex128)
     balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
-    values, left, right = scipy.linalg.eig(balanced, left=True, right=True)
+    values, left, right = (np.asarray(part) for part in scipy.linalg.eig(balanced, left=True, right=True))
     product = np.einsum("ik,ik->k", left.conj(), right)
     cosine, norm = np.abs(product), np.linalg.norm(balanced, 2)
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         rounding = np.minimum(ROUNDING * norm / cosine, ROUNDED_ZERO * norm)
         poles = np.where(np.abs(values) <= rounding, 0.0, values)
         to_outputs, from_inputs = np.abs(C * scale @ right), np.abs(left.conj().T @ (B / scale[:, None]))
@@ -127,7 +127,7 @@ def _default_horizon(moving: ComplexArray) -> float:
     """Give the time [s] until the slowest mode has settled or swung long enough, or an unstable one has grown."""
     if moving.size == 0:
         return NO_SCALE
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         settled = SETTLED / np.abs(moving.real)
         swung = MOST_PERIODS * 2.0 * np.pi / np.abs(moving.imag)
     end = float(np.minimum(settled, swung).max())

@@ -55,7 +55,7 @@ def read_mat(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
     ValueError, zlib.error
         The bytes are damaged or end too early.
     """
-    if content.startswith(b"MATLAB 7.3"):
+    if content.startswith(b"MATLAB 7.3") or content[HEADER - 4 : HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
         msg = "this is a MATLAB 7.3 (HDF5) file. Save it with  save(file, ..., '-v7')."
         raise FileFormatError(msg, path="")
     order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])

@@ -21,12 +21,13 @@ from halfdof_ctrl.arrays import (
     ComplexArray,
     Matrix,
     checked_matrix,
+    checked_square_matrices,
     is_complex,
     read_only,
     unit_matrix,
     zero_matrix,
 )
-from halfdof_ctrl.errors import MatrixError, SignalNameError
+from halfdof_ctrl.errors import SignalNameError
 from halfdof_ctrl.evaluation import quadratic_transfer
 from halfdof_ctrl.names import (
     checked_dofs,
@@ -217,8 +218,8 @@ def mechss(
       inputs:  F_mass, F_joint
       outputs: mass, joint
     """
-    M, C, K = _square_matrices(M, C, K)
-    n = M.shape[0]
+    M, C, K = checked_square_matrices((M, C, K), "MCK")
+    n = len(M)
     names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
     m = _signals((B, Bv, Ba), axis=1, default=n)
     p = _signals((F, G, H), axis=0, default=n)
@@ -259,23 +260,8 @@ def mechss(
 
 def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Tell which columns of M are not null, and which of the others have a column in C that is not."""
-    inertial = np.asarray(M.any(axis=0))
-    return inertial, np.asarray(C.any(axis=0) & ~inertial)
-
-
-def _square_matrices(*given: object) -> tuple[Matrix, Matrix, Matrix]:
-    """Check M, C and K against each other; None becomes zeros."""
-    size: tuple[int, int] | None = None
-    checked: list[Matrix | None] = []
-    for letter, matrix in zip("MCK", given, strict=True):
-        checked.append(None if matrix is None else checked_matrix(matrix, letter, size))
-        if size is None and checked[-1] is not None:
-            size = checked[-1].shape
-    if size is None:
-        msg = "M, C and K are all None: a model needs at least one of them."
-        raise MatrixError(msg, matrix="K")
-    M, C, K = (zero_matrix(*size) if matrix is None else matrix for matrix in checked)
-    return M, C, K
+    inertial = np.asarray(np.logical_or.reduce(M, axis=0))
+    return inertial, np.asarray(np.logical_or.reduce(C, axis=0) > inertial)
 
 
 def _signals(given: Sequence[npt.ArrayLike | None], axis: int, default: int) -> int:

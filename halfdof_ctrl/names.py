@@ -104,7 +104,9 @@ def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
         As `checked_names`, or a DOF is named like the velocity or acceleration of another.
     """
     names = (given,) if isinstance(given, str) else tuple(given)
-    return _checked_dofs(names, count) if all(type(name) is str for name in names) else checked_names(names, count, "DOFs")
+    return (
+        _checked_dofs(names, count) if all(type(name) is str for name in names) else checked_names(names, count, "DOFs")
+    )
 
 
 @lru_cache(maxsize=256)

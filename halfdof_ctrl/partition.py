@@ -12,6 +12,7 @@ needs no mixing stays the DOF that it was. Derivation: docs/explanation/reductio
 
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -21,7 +22,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix
-from halfdof_ctrl.errors import NearlyMasslessWarning
+from halfdof_ctrl.errors import NearlyMasslessWarning, callers_level
 from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.scaling import equilibrating_factors
@@ -31,7 +32,7 @@ IndexArray: TypeAlias = npt.NDArray[np.intp]
 RANK_TOLERANCE = 16 * np.finfo(float).eps  #: times the block's size; singular values below are null
 CANCELLATION = 16 * np.finfo(float).eps  #: times n: entries of C N below this part of their terms' size are zero
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
-PLAIN_SPREAD = 1e5  #: of mass and of stiffness over mass; a smaller one needs no closer look
+PLAIN_SPREAD = 1e5  #: of stiffness over mass between the DOFs; a smaller one needs no closer look
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -123,19 +124,23 @@ def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPart
     inertial, half = null_column_kinds(model.M, model.C)
     if tol is not None or _spread_is_wide(model, inertial):
         inertial, half = _without_tiny_masses(model, inertial, 0.0 if tol is None else tol)
-    massive, damped = inertial.tolist(), half.tolist()
+    return _selection(tuple(inertial.tolist()), tuple(half.tolist()), model.dofs)
+
+
+@lru_cache(maxsize=32)
+def _selection(massive: tuple[bool, ...], damped: tuple[bool, ...], dofs: tuple[str, ...]) -> DofPartition:
     every = range(len(massive))
     with_mass, with_damping = [i for i in every if massive[i]], [i for i in every if damped[i]]
     order = [*with_mass, *with_damping, *[i for i in every if not (massive[i] or damped[i])]]
     return DofPartition(
         method="selection",
-        order=np.array(order),
+        order=read_only(np.array(order)),
         basis=None,
         in_order=order == list(every),
         n_inertial=len(with_mass),
         n_half=len(with_damping),
         n_static=len(order) - len(with_mass) - len(with_damping),
-        coordinates=tuple([model.dofs[i] for i in order]),
+        coordinates=tuple([dofs[i] for i in order]),
         evidence=(),
     )
 
@@ -143,18 +148,23 @@ def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPart
 def mass_ratios(model: SecondOrderModel) -> FloatArray:
     """Give each DOF's mass relative to the largest, free of units.
 
-    Rows, columns and time are scaled until ``|K| + |C| + |M|`` is equilibrated and the scaled M and K
-    are of one size (H.-Y. Fan, W.-W. Lin, P. Van Dooren, Normwise scaling of second order polynomial
-    matrices, 2004); the ratio is between the largest entries of the columns of the scaled M.
+    At the slowest DOF's own frequency g the rows and columns of ``|K| + g |C| + g^2 |M|`` are equilibrated; the
+    ratio is between the largest entries of the columns of the scaled M. So it compares a DOF's inertia with what
+    else acts on it, at the time scale of the heavy DOFs.
     """
-    size = [np.abs(matrix) for matrix in (model.M, model.C, model.K)]
-    gamma = 1.0
-    for _ in range(3):  # the scale of time follows from the scaled entries, and they from it
-        rows, columns = equilibrating_factors(size[0] * gamma**2 + size[1] * gamma + size[2])
-        mass = (size[0] * rows[:, None] * columns).max(axis=0)
-        stiffness = ((size[2] + size[1] * gamma) * rows[:, None] * columns).max()
-        gamma = float(np.sqrt(stiffness / mass.max())) if stiffness > 0.0 and mass.max() > 0.0 else 1.0
+    M, C, K = (np.abs(matrix) for matrix in (model.M, model.C, model.K))
+    speeds = _own_speeds(model)
+    gamma = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
+    rows, columns = equilibrating_factors(K + gamma * C + gamma**2 * M, even=2.0)
+    mass = (M * rows[:, None] * columns).max(axis=0)
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
+
+
+def _own_speeds(model: SecondOrderModel) -> FloatArray:
+    """Give max(K_jj / M_jj, (C_jj / M_jj)^2) of the DOFs with M_jj, zero for others: the same in any unit of them."""
+    mass, drag, stiffness = (np.abs(np.diagonal(matrix)) for matrix in (model.M, model.C, model.K))
+    with_mass = np.where(mass > 0.0, mass, np.inf)
+    return np.maximum(stiffness / with_mass, (drag / with_mass) ** 2)
 
 
 def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
@@ -194,13 +204,10 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
 
 def _spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:
     """Tell cheaply whether some mass might be tiny against the others in some unit."""
-    if np.count_nonzero(inertial) <= 1:
+    if len(inertial) == 1 or np.count_nonzero(inertial) <= 1:
         return False
-    mass = np.abs(model.M).max(axis=0)[inertial]
-    stiffness = (np.abs(model.K) + np.abs(model.C)).max(axis=0)[inertial]
-    return bool(
-        mass.max() > PLAIN_SPREAD * mass.min() or (stiffness > PLAIN_SPREAD * mass / mass.max() * stiffness.min()).any()
-    )
+    speeds = _own_speeds(model)[inertial]
+    return bool(speeds.max() > PLAIN_SPREAD * speeds.min())
 
 
 def _without_tiny_masses(
@@ -218,7 +225,7 @@ def _without_tiny_masses(
             "zero: their two states are far faster than the others and cost digits. If they are meant to be "
             f"massless, set their mass to zero or pass tol={2.0 * largest:.0e}."
         )
-        warnings.warn(msg, NearlyMasslessWarning, stacklevel=5)
+        warnings.warn(msg, NearlyMasslessWarning, stacklevel=callers_level())
     return inertial, model.C.any(axis=0) & ~inertial
 
 

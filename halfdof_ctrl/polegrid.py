@@ -5,12 +5,14 @@ s = r (-zeta + j sqrt(1 - zeta^2)) for all r, one of equal natural frequency s =
 as points, so that they are right on logarithmic axes too.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.arrays import FloatArray
 
 WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
 AT_ORIGIN = 1e-9  #: points below this part of the largest |s| do not decide on that
@@ -18,10 +20,12 @@ DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8
 APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 SAME = 0.004  #: distance below which markers cover each other, as part of the axes
 GREY = "0.78"
-TEXT = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5}
+BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 
 
-def set_pole_axes(ax: Axes, points: ComplexArray, *, discrete: bool) -> None:
+def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete: bool) -> None:
     """Set scales and limits that show all points, the origin (or unit circle), and some room."""
     if discrete:
         points = np.concatenate([points, [-1.0, 1.0, 1.0j, -1.0j]])
@@ -34,13 +38,14 @@ def set_pole_axes(ax: Axes, points: ComplexArray, *, discrete: bool) -> None:
         linear = 10.0 ** np.floor(np.log10(smallest))
         for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
             set_scale("symlog", linthresh=linear)
-            axis.set_major_locator(SymmetricalLogLocator(base=10.0, linthresh=linear))
-            axis.get_major_locator().set_params(numticks=9)  # type: ignore[attr-defined]
+            locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
+            locator.set_params(numticks=9)
+            axis.set_major_locator(locator)
         ax.set_xlim(min(8.0 * left, -linear), max(8.0 * right, linear))
         top = max(8.0 * height, 10.0 * linear)
     else:
         width = max(right - left, 0.1 * height) or 1.0
-        ax.set_xlim(left - 0.18 * width, right + 0.18 * width)
+        ax.set_xlim(min(left - 0.18 * width, -0.7 * width), right + 0.18 * width)
         top = 1.2 * max(height, 0.35 * width)
     ax.set_ylim(-top, top)
 
@@ -57,20 +62,24 @@ def draw_pole_grid(ax: Axes) -> None:
             continue
         last = end
         _draw_mirrored(ax, ray)
-        shift = {"ha": "left" if end[0] < 0.5 else "center", "va": "top"}  # noqa: PLR2004
-        ax.text(*end, f"ζ = {zeta:g}", transform=ax.transAxes, **shift, **TEXT)
+        side = "left" if end[0] < 0.5 else "center"  # noqa: PLR2004
+        ax.text(end[0] + 0.005, end[1] - 0.008, f"ζ = {zeta:g}", transform=ax.transAxes, ha=side, va="top", **TEXT)
     small = np.geomspace(1e-9, np.pi / 4.0, 150)
     angles = np.concatenate([np.pi / 2.0 + small, np.pi - small[::-1]])
+    last = np.full(2, np.inf)
     for radius in _natural_frequencies(ax, reach):
         arc = radius * np.exp(1j * angles)
-        inside = np.flatnonzero(_inside(ax, arc))
-        if inside.size > 10:  # noqa: PLR2004
+        path = _axes_coordinates(ax, arc.conj())[_inside(ax, arc)]
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        if length[-1] > APART:
             _draw_mirrored(ax, arc)
-            middle = arc[inside[inside.size // 2]].conjugate()
-            ax.text(middle.real, middle.imag, f"{radius:g} rad/s", ha="center", va="center", **TEXT)
+            middle = path[np.searchsorted(length, 0.5 * length[-1])]
+            if np.hypot(*(middle - last)) > APART:
+                ax.text(middle[0], middle[1], f"{radius:g} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
+                last = middle
 
 
-def mark_multiple(ax: Axes, points: ComplexArray, colour: str) -> None:
+def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
     """Write how many points lie on the same spot, where it is more than one."""
     left = _axes_coordinates(ax, points)
     while left.shape[0]:
@@ -78,7 +87,7 @@ def mark_multiple(ax: Axes, points: ComplexArray, colour: str) -> None:
         if np.count_nonzero(same) > 1:
             ax.annotate(
                 f"{np.count_nonzero(same)}x",
-                left[same].mean(axis=0),
+                tuple(left[same].mean(axis=0).tolist()),
                 xycoords=ax.transAxes,
                 xytext=(6, 6),
                 textcoords="offset points",
@@ -93,20 +102,20 @@ def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:
     if ax.get_xscale() == "symlog":
         linear = ax.xaxis.get_transform().linthresh  # type: ignore[attr-defined]
         return 10.0 ** np.arange(np.ceil(np.log10(linear)), np.log10(reach), 1.0)
-    ticks = MaxNLocator(5).tick_values(0.0, reach)
-    return np.asarray(ticks[ticks > 0.0])
+    ticks = np.asarray(MaxNLocator(5).tick_values(0.0, reach))
+    return ticks[ticks > 0.0]
 
 
-def _draw_mirrored(ax: Axes, points: ComplexArray) -> None:
+def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:
     for half in (points, points.conj()):
         ax.plot(half.real, half.imag, color=GREY, linewidth=0.7, zorder=0.6, label="_grid", scalex=False, scaley=False)
 
 
-def _axes_coordinates(ax: Axes, points: ComplexArray) -> FloatArray:
+def _axes_coordinates(ax: Axes, points: npt.NDArray[np.complexfloating]) -> FloatArray:
     """Give where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
     return np.asarray((ax.transScale + ax.transLimits).transform(np.column_stack([points.real, points.imag])))
 
 
-def _inside(ax: Axes, points: ComplexArray) -> npt.NDArray[np.bool_]:
+def _inside(ax: Axes, points: npt.NDArray[np.complexfloating]) -> npt.NDArray[np.bool_]:
     places = _axes_coordinates(ax, points)
-    return ((places >= 0.0) & (places <= 1.0)).all(axis=1)
+    return np.asarray(((places >= 0.0) & (places <= 1.0)).all(axis=1))

@@ -37,7 +37,7 @@ def pole_map_plot(
     title: str | None = None,
     label: str | None = None,
 ) -> control.ControlPlot:
-    """Draw poles, finite eigenvalues of the descriptor form, and zeros in the s-plane.
+    """Draw poles, finite eigenvalues of (M, C, K), and zeros in the s-plane.
 
     Parameters
     ----------
@@ -74,12 +74,10 @@ def pole_map_plot(
     '2 infinite eigenvalues deflated'
     >>> plt.close(cplt.figure)
     """
-    if feedback is not None and not isinstance(feedback, StateFeedback):
-        msg = f"feedback must be a StateFeedback, as lqr(model, ...) gives it, not {type(feedback).__name__}."
-        raise ParameterError(msg, parameter="feedback", value=feedback)
+    _require_feedback(feedback)
     marks = _marks(sysdata, feedback)
     axes = prepared_axes(ax, (1, 1), "a single one for the s-plane", height=4.8)
-    plane, lines, prefix = axes[0, 0], no_lines(axes), legend_prefix(label, sysdata)
+    plane, lines, prefix = axes[0, 0], no_lines(axes), legend_prefix(label)
     discrete = isinstance(sysdata, control.StateSpace) and sysdata.isdtime(strict=True)
     if not plane.has_data():
         set_pole_axes(plane, np.concatenate([points for points, _, _ in marks]), discrete=discrete)
@@ -88,7 +86,13 @@ def pole_map_plot(
         lines[0, 0] += plane.plot(points.real, points.imag, label=prefix + text, linestyle="none", **style)
         if style["marker"] == "x":
             mark_multiple(plane, points, style["color"])
-    return finished_plot(lines, axes, title, own=ax is None)
+    return finished_plot(lines, axes, title, sysdata, own=ax is None)
+
+
+def _require_feedback(feedback: object) -> None:
+    if not isinstance(feedback, StateFeedback | None):
+        msg = f"feedback must be a StateFeedback, as lqr(model, ...) gives it, not {type(feedback).__name__}."
+        raise ParameterError(msg, parameter="feedback", value=feedback)
 
 
 def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedback | None) -> list[Mark]:
@@ -100,23 +104,21 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
         infinite = structure.n_infinite
         marks = [
             *_poles_of_A(sysdata, closed),
-            (structure.finite_eigenvalues, "finite eigenvalues of the descriptor form", RING),
+            (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
             (zeros(sysdata), "zeros", ZERO),
             (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NOTHING),
         ]
     else:
         marks = [(np.asarray(sysdata.poles()), f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO)]
     if feedback is not None:
-        marks.insert(1, (np.asarray(feedback.poles), "poles with feedback (closed loop)", CLOSED))
+        marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
     return [mark for mark in marks if mark[0].size or mark[2] is NOTHING]
 
 
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
         A = exact_reduction(model).A
-    except ComplexModelError:
-        return []
-    except SingularLeadingMatrixError:
+    except (ComplexModelError, SingularLeadingMatrixError):
         return []
     poles = scipy.linalg.eigvals(A) if A.size else NONE
     return [(np.asarray(poles), f"poles of A{closed}", CROSS)]
@@ -132,10 +134,10 @@ def _zeros_of(sys: control.StateSpace) -> ComplexArray:
 
 def _draw_plane(ax: Axes, *, grid: bool, discrete: bool) -> None:
     """Draw what lies behind the markers, and label the axes."""
-    boundary = {"color": "0.35", "linewidth": 1.0, "zorder": 0.8}
+    boundary: dict[str, Any] = {"color": "0.35", "linewidth": 1.0, "zorder": 0.8}
     if discrete:
         ax.add_patch(Circle((0.0, 0.0), 1.0, fill=False, **boundary))
-        ax.set_aspect("equal", adjustable="datalim")
+        ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel("real part of z [-]")
         ax.set_ylabel("imaginary part of z [-]")
         return

@@ -23,7 +23,7 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange
 
-from halfdof_ctrl.arrays import FloatArray, read_only, unit_matrix
+from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.errors import (
     ComplexModelError,
     InconsistentStateError,
@@ -329,7 +329,7 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     partition, leading = _partitioned(model, tol, method)
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     m, N = model.B.shape[1], moving + n_i
-    forces = trimmed((model.B, model.Bv, model.Ba)) or (model.B,)
+    forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed((model.B, model.Bv, model.Ba))
     right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
     np.negative(partition.times_basis(model.K, 0, moving), out=right[:, :moving])
     np.negative(partition.times_basis(model.C, 0, n_i), out=right[:, moving:N])
@@ -338,8 +338,9 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     solved = leading.solve(right)
     rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
     rate[:n_i, moving:N] = unit_matrix(n_i)
-    np.add(solved[n_i:moving], 0.0, out=rate[n_i:moving])  # adding zero leaves no negative zeros to be printed
-    np.add(solved[:n_i], 0.0, out=rate[moving:])
+    rate[n_i:moving] = solved[n_i:moving]
+    rate[moving:] = solved[:n_i]
+    rate += 0.0  # leaves no negative zeros to be printed
     A = rate[:, :N]
     B, shift = _absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     return ExactReduction(

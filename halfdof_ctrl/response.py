@@ -101,7 +101,9 @@ def frequency_response(
     else:
         sys = sysdata
     frequencies = checked_frequencies(default_frequencies(sys.poles()) if omega is None else omega)
-    points = np.exp(1j * frequencies * float(sys.dt)) if sys.isdtime(strict=True) else 1j * frequencies
+    points = np.asarray(1j * frequencies, dtype=np.complex128)
+    if sys.isdtime(strict=True):
+        points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
     values = state_space_response(A, B, C, D, points)
     return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)

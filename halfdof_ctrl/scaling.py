@@ -14,18 +14,20 @@ MOST_PASSES = 12  #: each pass halves the spread's exponent; 12 take it from 2^2
 EVEN = 2.0**10  #: rows and columns whose largest entries are between 1/1024 and 1024 are left as they are
 
 
-def equilibrating_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+def equilibrating_factors(matrix: FloatArray, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
     """Give powers of two r, c such that ``diag(r) matrix diag(c)`` has row and column maxima near one.
 
     Parameters
     ----------
     matrix : (k, l) ndarray
         Any real matrix; zero rows and columns are left alone.
+    even : float, optional
+        Maxima between 1 / even and even are near enough to one.
 
     Returns
     -------
     (k,) and (l,) ndarrays
-        Factors, all one where the maxima lie between 1/1024 and 1024 already.
+        Factors, all one where the maxima are near enough to one already.
 
     Examples
     --------
@@ -36,7 +38,7 @@ def equilibrating_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
     for _ in range(MOST_PASSES):
         by_row, by_column = np.maximum.reduce(size, axis=1, initial=0.0), np.maximum.reduce(size, axis=0, initial=0.0)
-        if _is_even(by_row) and _is_even(by_column):
+        if _is_even(by_row, even) and _is_even(by_column, even):
             break
         down, across = _root(by_row), _root(by_column)
         rows *= down
@@ -46,9 +48,9 @@ def equilibrating_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rows, columns
 
 
-def _is_even(maxima: FloatArray) -> bool:
-    """Tell whether all nonzero maxima lie between 1/1024 and 1024."""
-    return all([1.0 / EVEN <= value <= EVEN or value == 0.0 for value in maxima.tolist()])  # noqa: C419  # faster
+def _is_even(maxima: FloatArray, even: float) -> bool:
+    """Tell whether all nonzero maxima lie between 1 / even and even."""
+    return all([1.0 / even <= value <= even or value == 0.0 for value in maxima.tolist()])  # noqa: C419  # faster
 
 
 def _root(maxima: FloatArray) -> FloatArray:

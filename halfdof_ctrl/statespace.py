@@ -12,7 +12,7 @@ import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.arrays import FloatArray, is_zero
+from halfdof_ctrl.arrays import FloatArray, is_zero, unit_matrix
 from halfdof_ctrl.errors import ImproperError, SignalNameError
 from halfdof_ctrl.model import Names, SecondOrderModel, mechss
 from halfdof_ctrl.names import control_label, control_labels, listed
@@ -72,7 +72,7 @@ def mech2ss(
            [-4.,  0.]])
     """
     if isinstance(model, SecondOrderModel | ExactReduction):
-        if any(value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)):
+        if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
             raise SignalNameError(msg, names=())
         reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
@@ -126,7 +126,7 @@ def labelled_system(
 def output_signal(reduction: ExactReduction) -> Signal:
     """Give the outputs of the reduced model as functions of the state, the inputs and their derivatives."""
     model, q = reduction.model, reduction.displacement
-    output = q.combined(model.F)
+    output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
     if not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(reduction.A, reduction.B))
     if not is_zero(model.H):
@@ -142,9 +142,8 @@ def _without_rounding(reduction: ExactReduction, output: Signal) -> Signal:
     The bound evaluates (6) and (7) with absolute values, where an input's column in the solution of (3) is
     known to 32 n eps of its largest entry, measured in the scaled unknowns.
     """
-    model = reduction.model
-    B, static = _sizes_of_solution(reduction)
-    A, q = np.abs(reduction.A), Signal(np.abs(reduction.displacement.X), (static,))
+    model, A = reduction.model, np.abs(reduction.A)
+    B, q = _sizes(reduction)
     bound = q.combined(np.abs(model.F))
     for order, matrix in ((1, model.G), (2, model.H)):
         term = q.combined(np.abs(matrix))
@@ -159,18 +158,20 @@ def _without_rounding(reduction: ExactReduction, output: Signal) -> Signal:
     return Signal(output.X, trimmed((output.U[0], *kept[1:])))
 
 
-def _sizes_of_solution(reduction: ExactReduction) -> tuple[FloatArray, FloatArray]:
-    """Give the size that rounding in B (N, m) and in U_0 of all DOFs (n, m) is relative to."""
-    part = reduction.partition
-    columns = np.ones(len(reduction.model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
+def _sizes(reduction: ExactReduction) -> tuple[FloatArray, Signal]:
+    """Give what rounding errors in B and in equation (4) are relative to: (3) and (5) with absolute values."""
+    part, model, A = reduction.partition, reduction.model, np.abs(reduction.A)
     n_i, moving = part.n_inertial, part.n_inertial + part.n_half
-    B, direct = np.abs(reduction.B), reduction.displacement.direct(len(reduction.model.inputs))
-    solution = np.vstack([B[moving:], B[n_i:moving], np.abs(part.to_coordinates(direct))[moving:]])
-    size = columns[:, None] * (solution / columns[:, None]).max(axis=0)
-    states = np.vstack([B[:n_i], size[n_i:moving], size[:n_i]])
-    static = np.zeros_like(direct)
-    static[moving:] = size[moving:]
-    return states, np.abs(part.T) @ static
+    scale = np.ones(len(model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
+    rates, statics = [], []
+    for force in (model.B, model.Bv, model.Ba):
+        solution = np.abs(reduction.leading.solve(np.asfortranarray(force))) / scale[:, None]
+        size = scale[:, None] * solution.max(axis=0)
+        rates.append(np.vstack([np.zeros_like(size[:n_i]), size[n_i:moving], size[:n_i]]))
+        statics.append(np.abs(part.T[:, moving:]) @ size[moving:])
+    shift = rates[1] + A @ rates[2]
+    X = np.abs(reduction.displacement.X)
+    return rates[0] + A @ shift, Signal(X, (statics[0] + X @ shift, statics[1] + X @ rates[2], statics[2]))
 
 
 def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:

@@ -17,18 +17,19 @@ from halfdof_ctrl.axes import (
     draw_grid,
     finished_plot,
     known_units,
+    label_y,
     legend_prefix,
     no_lines,
     plain,
     prepared_axes,
     require_system,
     signal_label,
+    signal_names,
     typeset,
 )
 from halfdof_ctrl.errors import ParameterError
 from halfdof_ctrl.horizon import relevant_poles, step_times
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import name_from_label
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.statespace import mech2ss
 
@@ -90,16 +91,18 @@ def step_plot(
     require_system(sysdata)
     known = known_units(sysdata, units)
     reduction = exact_reduction(sysdata) if isinstance(sysdata, SecondOrderModel) else None
-    sys = sysdata if reduction is None else mech2ss(reduction)
+    sys: Any = sysdata if reduction is None else mech2ss(reduction)
     response = control.step_response(sys, _times(sys, reduction, timepts), squeeze=False)
     time, outputs = np.asarray(response.time), np.asarray(response.outputs)
     (p, m), panels = outputs.shape[:2], _panels(reduction, known)
     what = f"{p} outputs and {len(panels)} groups of recovered displacements in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (p + len(panels), m), what, height=1.2 + 1.6 * max(2, p + len(panels)))
-    lines, prefix = no_lines(axes), legend_prefix(label, sysdata)
+    lines, prefix = no_lines(axes), legend_prefix(label)
     style: dict[str, Any] = {"drawstyle": "steps-post" if sys.isdtime(strict=True) else "default", "linewidth": 1.5}
     for i, j in product(range(p), range(m)):
-        lines[i, j] += axes[i, j].plot(time, outputs[i, j], label=f"{prefix}outputs", **style)
+        lines[i, j] += axes[i, j].plot(
+            time, outputs[i, j], label=f"{prefix}outputs" if panels or prefix else "_outputs", **style
+        )
     if reduction is not None and panels:
         motion, kinds = reduction.recover(response), _kinds(reduction)
         for (row, (unit, dofs)), j in product(enumerate(panels.items(), start=p), range(m)):
@@ -107,15 +110,15 @@ def step_plot(
             lines[row, j] += _draw_recovered(axes[row, j], time, histories, {d: kinds[d] for d in dofs}, prefix)
             axes[row, j].set_ylabel((plain(dofs[0]) if len(dofs) == 1 else "displacement") + unit)
     _dress(axes, sys, known, grid=grid)
-    return finished_plot(lines, axes, title, own=ax is None)
+    return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 
 def _times(
     sys: control.StateSpace, reduction: ExactReduction | None, timepts: npt.ArrayLike | None
-) -> FloatArray | None:
+) -> FloatArray | float | None:
     """Check the given times, or choose them from the modes seen in the outputs and the recovered DOFs."""
-    given = None if timepts is None else np.asarray(timepts, dtype=float)
-    if given is not None and given.ndim > 0:
+    if timepts is not None and np.ndim(timepts) > 0:
+        given = np.asarray(timepts, dtype=float)
         steps = np.diff(given) if given.ndim == 1 else np.zeros(0)
         if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN * steps[0]).all():
             msg = (
@@ -124,32 +127,32 @@ def _times(
             )
             raise ParameterError(msg, parameter="timepts", value=timepts)
         return given
+    horizon = None if timepts is None else float(np.asarray(timepts))
     if sys.isdtime(strict=True):
-        return given
+        return horizon
     C, D = np.asarray(sys.C), np.asarray(sys.D)
     if reduction is not None:
         motion = reduction.displacement
         C, D = np.vstack([C, motion.X]), np.vstack([D, motion.direct(sys.ninputs)])
-    return step_times(relevant_poles(sys.A, sys.B, C, D), None if given is None else float(given))
+    return step_times(relevant_poles(sys.A, sys.B, C, D), horizon)
 
 
 def _kinds(reduction: ExactReduction) -> dict[str, str]:
     """Tell for each DOF that is not wholly inertial whether it is half or static."""
-    part, dofs = reduction.partition, reduction.model.dofs
-    inertial, moving = part.n_inertial, part.n_inertial + part.n_half
-    half, static = part.T[:, inertial:moving].any(axis=1), part.T[:, moving:].any(axis=1)
-    return {
-        dof: "half" if is_half else "static"
-        for dof, is_half, is_static in zip(dofs, half, static, strict=True)
-        if is_half or is_static
-    }
+    part = reduction.partition
+    moving = part.n_inertial + part.n_half
+    kinds: dict[str, str] = {}
+    for dof, row in zip(reduction.model.dofs, part.T, strict=True):
+        if row[part.n_inertial :].any():
+            kinds[dof] = "half" if row[part.n_inertial : moving].any() else "static"
+    return kinds
 
 
 def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:
     """Group the DOFs that are recovered by the unit they are drawn in."""
     groups: dict[str, list[str]] = {}
     for dof in [] if reduction is None else _kinds(reduction):
-        groups.setdefault(f" [{typeset(units[dof])}]", []).append(dof)
+        groups.setdefault(f" [{typeset(units[dof])}]" if dof in units else "", []).append(dof)
     return groups
 
 
@@ -169,10 +172,10 @@ def _draw_recovered(
 
 def _dress(axes: AxesArray, sys: control.StateSpace, units: dict[str, str], *, grid: bool) -> None:
     """Set labels and grid of all axes."""
-    for i, name in enumerate([name_from_label(label) for label in sys.output_labels]):
+    for i, name in enumerate(signal_names(sys)[0]):
         for ax in axes[i]:
-            ax.set_ylabel(signal_label(name, units))
-    for j, name in enumerate([name_from_label(label) for label in sys.input_labels]):
+            label_y(ax, signal_label(name, units))
+    for j, name in enumerate(signal_names(sys)[1]):
         step = f"{plain(name)} = 1 {typeset(units[name])}" if name in units else f"{plain(name)} = 1"
         axes[-1, j].set_xlabel(f"time after the step {step} {'[samples]' if sys.dt is True else '[s]'}")
     for ax in axes.flat:

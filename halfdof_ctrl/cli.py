@@ -1,0 +1,354 @@
+"""The command `halfdof-ctrl`.
+
+Exit codes: 0 done, 1 the cross-check failed, 2 the request or the model is refused (one line on stderr,
+nothing written).
+"""
+
+import argparse
+import functools
+import importlib.metadata
+import inspect
+import io
+import math
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeAlias
+
+import control
+import numpy as np
+
+from halfdof_ctrl.crosscheck import crosscheck
+from halfdof_ctrl.descriptor import pencil_structure
+from halfdof_ctrl.design import StateFeedback, lqr
+from halfdof_ctrl.eigentable import eigenvalue_table
+from halfdof_ctrl.errors import FileFormatError, HalfdofError, ParameterError
+from halfdof_ctrl.files import (
+    GAIN_ENDINGS,
+    MATRIX_ENDINGS,
+    TABLE_ENDINGS,
+    ending,
+    load_model,
+    replacing,
+    save_gain,
+    save_response,
+    save_system,
+)
+from halfdof_ctrl.horizon import relevant_poles, step_times
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.mounts import hydromount
+from halfdof_ctrl.names import motions
+from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.reduction import exact_reduction
+from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
+from halfdof_ctrl.response import DEFAULT_POINTS, default_frequencies, frequency_response
+from halfdof_ctrl.statespace import mech2ss
+
+PROGRAM = "halfdof-ctrl"
+DONE, CHECK_FAILED, REFUSED = 0, 1, 2
+INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
+_Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
+BUILT_IN = {"hydromount": hydromount}
+BUILT_IN_SIGNALS: dict[str, _Signals] = {
+    "hydromount": (("F_y",), ("y", "y_dot"))
+}  #: what is shown unless the user asks for others
+FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
+FIGURE_ENDINGS = (".png", ".svg", ".pdf")
+WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command with its arguments, by default those of the process, and give its exit code."""
+    arguments = _parser().parse_args(argv)
+    command: Callable[[argparse.Namespace], int] = arguments.command
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show is no reason to stop
+            stream.reconfigure(errors="backslashreplace")
+    try:
+        with _warnings_on_stderr():
+            without_windows()
+            code = command(arguments)
+            sys.stdout.flush()
+    except BrokenPipeError:  # who reads our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that Python's own flush at exit does not complain
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except HalfdofError as refusal:
+        _say("error", str(refusal))
+        return REFUSED
+    except OSError as refusal:
+        _say("error", f"{refusal.filename or 'file'}: {refusal.strerror or refusal}")
+        return REFUSED
+    return code
+
+
+def _report(arguments: argparse.Namespace) -> int:
+    report = write_report(_model(arguments), arguments.o)
+    print(report.eigenvalues)
+    print(report.check)
+    for note in report.notes:
+        print(note)
+    print(f"report: {arguments.o}{os.sep}index.html")
+    return DONE if report.passed else CHECK_FAILED
+
+
+def _info(arguments: argparse.Namespace) -> int:
+    model = _model(arguments)
+    print(model)
+    structure = pencil_structure(model)
+    kind = "regular" if structure.is_regular else "SINGULAR"
+    print(
+        f"Pencil: {kind}, {structure.finite_eigenvalues.size} finite and {structure.n_infinite} infinite eigenvalues, "
+        f"index {structure.index}"
+    )
+    try:
+        print(exact_reduction(model))
+    except HalfdofError as refusal:
+        print(f"No state space: {refusal}")
+    return DONE
+
+
+def _ss(arguments: argparse.Namespace) -> int:
+    _require_ending(arguments.o, MATRIX_ENDINGS)
+    system = mech2ss(_model(arguments))
+    if arguments.o is None:
+        print(system)
+    else:
+        save_system(system, arguments.o)
+    return DONE
+
+
+def _bode(arguments: argparse.Namespace) -> int:
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    omega = _frequencies(model, arguments)
+    if kind in TABLE_ENDINGS:
+        save_response(frequency_response(model, omega), arguments.o)
+    else:
+        save_figure(bode_plot(model, omega, dB=arguments.db, Hz=arguments.hz, title=model.name), arguments.o)
+    return DONE
+
+
+def _step(arguments: argparse.Namespace) -> int:
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    if kind in TABLE_ENDINGS:
+        recovered = _with_recovered(model)
+        system = mech2ss(recovered)
+        times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
+        save_response(control.step_response(system, times, squeeze=False), arguments.o)
+    else:
+        save_figure(step_plot(model, arguments.time, title=model.name), arguments.o)
+    return DONE
+
+
+def _poles(arguments: argparse.Namespace) -> int:
+    _require_ending(arguments.o, FIGURE_ENDINGS)
+    model = _model(arguments)
+    table = eigenvalue_table(model, mech2ss(model))
+    if arguments.o is not None:
+        save_figure(pole_map_plot(model, title=model.name), arguments.o)
+    print(table)
+    return DONE
+
+
+def _lqr(arguments: argparse.Namespace) -> int:
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *GAIN_ENDINGS))
+    model = _model(arguments)
+    feedback, words = _feedback(model, arguments)
+    if kind in FIGURE_ENDINGS:
+        save_figure(pole_map_plot(model, feedback=feedback, title=model.name), arguments.o)
+    elif kind is not None:
+        save_gain(feedback, arguments.o)
+    if words:
+        print(words)
+    print(feedback)
+    return DONE
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    _require_ending(arguments.o, (".json",))
+    model = _model(arguments)
+    check = crosscheck(model, mech2ss(model))
+    if arguments.o is not None:
+        with replacing(arguments.o) as stream:
+            stream.write(check_as_json(check))
+    print(check)
+    return DONE if check.passed else CHECK_FAILED
+
+
+def _model(arguments: argparse.Namespace) -> SecondOrderModel:
+    """Make the built-in model or load the file, and select its signals."""
+    name: str = arguments.model
+    signals: _Signals
+    if name in BUILT_IN:
+        signals = BUILT_IN_SIGNALS[name]
+        model = BUILT_IN[name](**_parameters(name, arguments.p))
+    else:
+        if arguments.p:
+            msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN)}); {name} is a file."
+            raise ParameterError(msg, parameter="-p", value=arguments.p)
+        if not Path(name).exists() and Path(name).suffix.lower() not in MATRIX_ENDINGS:
+            msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
+            raise FileFormatError(msg, path=name)
+        model = load_model(name)
+        signals = model.inputs, model.outputs
+    return model.select(_listed(arguments.inputs, signals[0]), _listed(arguments.outputs, signals[1]))
+
+
+def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
+    known = list(inspect.signature(BUILT_IN[name]).parameters)
+    parameters = _assignments(given, "-p")
+    for symbol in parameters:
+        if symbol not in known:
+            msg = f"{name} has no parameter {symbol!r}. Known: {', '.join(known)}."
+            raise ParameterError(msg, parameter=symbol, value=parameters[symbol])
+    return parameters
+
+
+def _assignments(given: Sequence[str], option: str) -> dict[str, float]:
+    """Read NAME=VALUE texts."""
+    values: dict[str, float] = {}
+    for text in given:
+        name, _, value = text.rpartition("=")
+        if not name:
+            msg = f"{option} takes a name and a number, NAME=VALUE, not {text!r}."
+            raise ParameterError(msg, parameter=option, value=text)
+        if name in values:
+            msg = f"{option} gives {name} twice."
+            raise ParameterError(msg, parameter=option, value=text)
+        values[name] = _number(value, f"{option} {name}")
+    return values
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        return float(text)
+    except ValueError as cause:
+        msg = f"{what} must be a number, not {text!r}."
+        raise ParameterError(msg, parameter=what, value=text) from cause
+
+
+def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
+    if given is None:
+        return list(default)
+    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+
+
+def _frequencies(model: SecondOrderModel, arguments: argparse.Namespace) -> np.ndarray | None:
+    """Choose the frequencies [rad/s] if any of the limits or their number is given."""
+    low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
+    if low is None and high is None and points is None:
+        return None
+    around = default_frequencies(pencil_structure(model).finite_eigenvalues)
+    low = around[0] if low is None else low
+    high = around[-1] if high is None else high
+    if not (math.isfinite(high) and 0.0 < low < high):
+        msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
+        raise ParameterError(msg, parameter="--omega-min", value=low)
+    points = DEFAULT_POINTS if points is None else points
+    if not FEWEST_POINTS <= points <= MOST_POINTS:
+        msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
+        raise ParameterError(msg, parameter="--points", value=points)
+    return np.geomspace(low, high, points)
+
+
+def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
+    """Add the displacements of DOFs without inertia to the outputs, as the figure shows them."""
+    part = exact_reduction(model).partition
+    known = motions(model.dofs)
+    extra = [name for name in (*part.half, *part.static) if name in known and name not in model.outputs]
+    return model.select(outputs=[*model.outputs, *extra])
+
+
+def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[StateFeedback, str]:
+    weights = {kind: _assignments(_listed(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
+    if arguments.energy is None and not any(weights.values()):
+        return default_design(model)
+    return lqr(
+        model,
+        displacement=weights["displacement"],
+        velocity=weights["velocity"],
+        acceleration=weights["acceleration"],
+        effort=weights["effort"],
+        energy=arguments.energy,
+    ), ""
+
+
+def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
+    """Refuse an ending before anything is computed."""
+    return None if path is None else ending(path, known)
+
+
+@contextmanager
+def _warnings_on_stderr() -> Iterator[None]:
+    """Show each warning once, as a line."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            yield
+        finally:
+            for message in dict.fromkeys(str(warning.message) for warning in caught):
+                _say("warning", message)
+
+
+def _say(kind: str, text: str) -> None:
+    print(f"{PROGRAM}: {kind}: {' '.join(text.split())}", file=sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog=PROGRAM,
+        description="Exact state space of mechanical models M, C, K with singular mass.",
+        epilog="Exit codes: 0 done, 1 the cross-check failed, 2 the request or the model is refused.",
+        allow_abbrev=False,
+    )
+    version = importlib.metadata.version("halfdof_ctrl")
+    parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    add = functools.partial(_add_command, commands)
+    add("report", _report, "write a page, figures, the state space and the check into a folder", "FOLDER", needed=True)
+    add("info", _info, "print the model, its pencil and its reduction", None)
+    add("ss", _ss, "print the state space, or write it (npz, mat)", "FILE")
+    bode = add("bode", _bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    bode.add_argument("--omega-min", type=float, metavar="W", help="lowest frequency [rad/s]")
+    bode.add_argument("--omega-max", type=float, metavar="W", help="highest frequency [rad/s]")
+    bode.add_argument("--points", type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})")
+    bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
+    bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
+    step = add("step", _step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
+    add("poles", _poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
+    regulator = add("lqr", _lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
+    for kind in WEIGHTS:
+        regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
+    regulator.add_argument("--energy", type=float, metavar="W", help="weight of the mechanical energy [1/J]")
+    add("check", _check, "check the state space against the descriptor form; write the figures (json)", "FILE")
+    return parser
+
+
+def _add_command(
+    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    name: str,
+    command: Callable[[argparse.Namespace], int],
+    purpose: str,
+    target: str | None,
+    *,
+    needed: bool = False,
+) -> argparse.ArgumentParser:
+    parser = commands.add_parser(
+        name, help=purpose, description=f"{purpose[0].upper()}{purpose[1:]}.", allow_abbrev=False
+    )
+    parser.set_defaults(command=command)
+    parser.add_argument("model", metavar="MODEL", help=f"a file (npz, mat) or a built-in model: {', '.join(BUILT_IN)}")
+    parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
+    parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")
+    parser.add_argument("--outputs", action="append", metavar="A,B", help="outputs, as y, y_dot, y_ddot")
+    if target is not None:
+        where = f"where to write; the ending of the {target.lower()} is its format" if target == "FILE" else "where"
+        parser.add_argument("-o", metavar=target, required=needed, help=where)
+    return parser

@@ -1,0 +1,147 @@
+"""Measure what the package promises about speed, as ratios of times within one run.
+
+Run ``python tests/benchmarks/run.py`` on a quiet machine. Each row is the smallest of several runs of both sides,
+taken in turns, so that a disturbance meets both. Nothing is asserted: times depend on the machine.
+"""
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+
+import control
+import numpy as np
+import scipy.linalg
+
+import halfdof_ctrl as hd
+
+POINTS = 1000
+DENSE_DOFS = 600
+STATE_COUNTS = (4, 20, 100, 200, 400)
+
+
+def smallest_times(*works: Callable[[], object], rounds: int = 5, repeats: int = 1) -> list[float]:
+    """Time each work several times in turns [s]."""
+    best = [float("inf")] * len(works)
+    for _ in range(rounds):
+        for index, work in enumerate(works):
+            start = time.perf_counter()
+            for _ in range(repeats):
+                work()
+            best[index] = min(best[index], (time.perf_counter() - start) / repeats)
+    return best
+
+
+def half_massless(n: int, seed: int = 0) -> hd.SecondOrderModel:
+    """Make a dense model of n DOFs of which the second half has no mass."""
+    generator = np.random.default_rng(seed)
+    damping, stiffness = (generator.standard_normal((n, n)) for _ in range(2))
+    mass = np.zeros((n, n))
+    mass[: n // 2, : n // 2] = np.diag(generator.uniform(1.0, 3.0, n // 2)) + 0.01
+    return hd.mechss(mass, damping @ damping.T / n + np.eye(n), stiffness @ stiffness.T / n + np.eye(n))
+
+
+def chain(states: int) -> control.StateSpace:
+    """Make a damped chain, a force on its first mass, the displacement of its last, some nodes massless."""
+    half = states // 5 + (states // 5 + states) % 2
+    n = (states + half) // 2
+    massive = np.ones(n)
+    massive[1 : 2 * half : 2] = 0.0
+    stiffness = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    model = hd.mechss(np.diag(massive), 0.05 * stiffness + 0.01 * np.eye(n), 100.0 * stiffness)
+    return hd.mech2ss(model.select(inputs="F_q0", outputs=f"q{n - 1}"))
+
+
+def companion(model: hd.SecondOrderModel) -> tuple[np.ndarray, np.ndarray]:
+    """Give A and E of the companion pencil ``A - s E``."""
+    n = len(model.dofs)
+    zero, unit = np.zeros((n, n)), np.eye(n)
+    return np.block([[zero, unit], [-model.K, -model.C]]), np.block([[unit, zero], [zero, model.M]])
+
+
+def report(work: str, ours: float, other: float, name: str, target: str) -> None:
+    """Print one row: our time, the other's, and the ratio in the direction of the target."""
+    ratio = f"{ours / other:7.2f} x {name}" if "<=" in target else f"{other / ours:7.1f} x faster than {name}"
+    print(f"{work:46} {1e3 * ours:10.3f} ms {1e3 * other:10.3f} ms  {ratio:52} target {target}")
+
+
+def measure_reduction() -> None:
+    """Dense reduction against one solve, QZ and slycot's descriptor conversion."""
+    model = half_massless(DENSE_DOFS)
+    half = DENSE_DOFS // 2
+    W = np.hstack([model.M[:, :half], model.C[:, half:]])
+    right = np.hstack([np.eye(DENSE_DOFS), model.C[:, :half], model.K])
+    name = f"exact_reduction, dense, n = {DENSE_DOFS}"
+    ours, solve = smallest_times(lambda: hd.exact_reduction(model), lambda: np.linalg.solve(W, right), rounds=15)
+    report(name, ours, solve, "numpy.linalg.solve of (3)", "<= 1.5")
+    A, E = companion(model)
+    (qz,) = smallest_times(lambda: scipy.linalg.eigvals(A, E), rounds=1)
+    report(name, ours, qz, "scipy.linalg.eigvals(A, E)", ">= 30")
+    try:
+        import slycot  # noqa: PLC0415  # optional here
+    except ImportError:
+        print("slycot is not installed: no comparison with sb10jd")
+        return
+    n, N = DENSE_DOFS, 2 * DENSE_DOFS
+    B, C = np.vstack([np.zeros((n, n)), np.eye(n)]), np.hstack([np.eye(n), np.zeros((n, n))])
+
+    def convert() -> object:
+        return slycot.sb10jd(N, n, n, A.copy(), B.copy(), C.copy(), np.zeros((n, n)), E.copy())
+
+    (sb10jd,) = smallest_times(convert, rounds=1)
+    report(name, ours, sb10jd, "slycot.sb10jd", ">= 8")
+
+
+def measure_mount() -> None:
+    """Compare the mount's way into python-control with python-control's own constructor."""
+    system = hd.mech2ss(hd.hydromount())
+    A, B, C, D = system.A, system.B, system.C, system.D
+    ours, plain = smallest_times(
+        lambda: hd.mech2ss(hd.hydromount()), lambda: control.ss(A, B, C, D), rounds=30, repeats=200
+    )
+    report("mech2ss(hydromount())", ours, plain, "control.ss(A, B, C, D)", "<= 3")
+
+
+def measure_frequency_response() -> None:
+    """1000 points of a chain with massless nodes, and how far both are from a direct solve."""
+    for states in STATE_COUNTS:
+        system = chain(states)
+        size = np.abs(system.poles())
+        omega = np.geomspace(size.min() / 2.0, size.max() * 2.0, POINTS)
+        ours, theirs = smallest_times(
+            lambda system=system, omega=omega: hd.frequency_response(system, omega),  # type: ignore[misc]
+            lambda system=system, omega=omega: control.frequency_response(system, omega),  # type: ignore[misc]
+            rounds=3,
+        )
+        report(f"frequency_response, {states} states", ours, theirs, "control.frequency_response", ">= 5")
+        few = omega[:: POINTS // 20]
+        unit = np.eye(states)
+        exact = np.array([(system.C @ np.linalg.solve(1j * w * unit - system.A, system.B))[0, 0] for w in few])
+        errors = [
+            np.abs(compute(system, few).frdata[0, 0] - exact).max() / np.abs(exact).max()
+            for compute in (hd.frequency_response, control.frequency_response)
+        ]
+        print(f"{'':46} error against direct solves: {errors[0]:.1e} (ours) {errors[1]:.1e} (control)")
+
+
+def measure_import() -> None:
+    """Import time in fresh processes."""
+
+    def imports(name: str) -> Callable[[], object]:
+        return lambda: subprocess.run([sys.executable, "-c", f"import {name}"], check=True)
+
+    ours, theirs = smallest_times(imports("halfdof_ctrl"), imports("control"), rounds=7)
+    report("import halfdof_ctrl", ours, theirs, "import control", "<= 1.1")
+
+
+def main() -> None:
+    """Print all rows."""
+    print(f"{'work':46} {'ours':>13} {'other':>13}  ratio")
+    measure_mount()
+    measure_import()
+    measure_frequency_response()
+    measure_reduction()
+
+
+if __name__ == "__main__":
+    main()
