@@ -1,7 +1,7 @@
 """Sphinx configuration: everything is built from this repository, without network access.
 
-Code in pages is executed by MyST-NB and an error stops the build. Formulas become MathML when the pages are built
-(`_ext/mathml.py`), so a reader needs no script and no network. There are no links into other projects' inventories,
+Code in pages is executed by MyST-NB and an error stops the build. Formulas are drawn when the pages are built
+(`_ext/svgmath.py`), so a reader needs no script and no network. There are no links into other projects' inventories,
 since these would be downloaded.
 """
 
@@ -17,7 +17,7 @@ author = "the halfdof_ctrl developers"
 copyright = "2026, the halfdof_ctrl developers"
 version = release = halfdof_ctrl.__version__
 
-extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_nb", "mathml"]
+extensions = ["sphinx.ext.autodoc", "sphinx.ext.autosummary", "numpydoc", "myst_nb", "svgmath"]
 exclude_patterns = ["_build", "_ext", "jupyter_execute"]
 html_theme = "furo"
 html_title = f"halfdof_ctrl {release}"
@@ -25,7 +25,7 @@ html_static_path = ["_static"]
 html_css_files = ["halfdof.css"]
 html_copy_source = False
 html_show_sourcelink = False
-html_math_renderer = "mathml"
+html_math_renderer = "svg"
 
 default_role = "py:obj"
 autodoc_typehints = "none"

@@ -1,7 +1,7 @@
 """A hydraulic engine mount from M, C, K to its eigenvalues, Bode diagram and pole map.
 
-Run ``python examples/ex01_hydromount.py [FIGURE]``: it prints the eigenvalues of the descriptor form beside the poles of the
-state space and draws the figure of the README. Imported, it draws and prints nothing.
+Run ``python examples/ex01_hydromount.py [FIGURE]``: it prints the eigenvalues of the descriptor form beside the poles
+of the state space and draws the figure of the README. Imported, it draws and prints nothing.
 """
 
 import sys

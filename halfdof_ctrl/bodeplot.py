@@ -47,6 +47,8 @@ HALF_TURN = 1e-6  #: [rad] a jump of the phase this close to pi comes from an un
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
 USUAL = 95.0  #: [%] of the points of a curve lie in the range that is shown in any case
+FLAT = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
+ROOM = 5.0  #: ... and gets this factor above and below
 SPIKE = 1e5  #: a peak higher than this times that range is cut
 NO_STATE_SPACE: dict[type[HalfdofError], str] = {
     ComplexModelError: "model is complex",
@@ -300,6 +302,8 @@ def _set_logarithmic(ax: Axes) -> None:
     if curve.size == 0:
         return
     ax.set_yscale("log")
+    if curve.max() <= FLAT * curve.min():
+        ax.set_ylim(curve.min() / ROOM, curve.max() * ROOM)
     usual = float(np.percentile(curve, USUAL))
     if ax.dataLim.y1 > SPIKE * usual:
         ax.set_ylim(top=np.sqrt(SPIKE) * usual)

@@ -115,9 +115,9 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     Notes
     -----
     A pole's error is compared with ``1e-10 |pole|`` plus what rounding of A moves it in first order,
-    16 eps |A| over the cosine between its left and right eigenvectors, and a transfer function's error with 1e-10 of
-    the channel's largest value plus 16 eps |y| |A| |x|, x and y the solutions for input and output. So a double
-    pole or a sharp resonance raises no false alarm. The figures are scaled so that 1e-10 is the limit.
+    16 eps ``|A|`` over the cosine between its left and right eigenvectors, and a transfer function's error with 1e-10
+    of the channel's largest value plus 16 eps ``|y| |A| |x|``, x and y the solutions for input and output. So a
+    double pole or a sharp resonance raises no false alarm. The figures are scaled so that 1e-10 is the limit.
 
     Examples
     --------

@@ -23,7 +23,7 @@ from halfdof_ctrl.arrays import ComplexArray, Matrix
 from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
-from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, equilibrating_powers, finite_part, powers_of_two
+from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, equilibrating_powers, finite_part
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where det P(s) is looked at, in units of the time scale
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
@@ -144,9 +144,10 @@ def require_regular(model: SecondOrderModel) -> None:
 
 def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float]:
     """Deflate the pencil (8) of ``R_0 + R_1 s + R_2 s^2``; its eigenvalues are in units of the scale given back."""
-    R0, R1, R2 = _equilibrated(coefficients)
-    scale = _time_scale((R0, R1, R2))
-    R1, R2 = R1 * scale, R2 * scale**2
+    scale = _time_scale(coefficients)
+    R0, R1, R2 = (matrix * scale**power for power, matrix in enumerate(coefficients))
+    rows, columns = equilibrating_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
+    R0, R1, R2 = (matrix * rows[:, None] * columns for matrix in (R0, R1, R2))
     left, right = _low_rank_factors(R2)
     rank = right.shape[0]
     corner = np.zeros((rank, rank))
@@ -158,39 +159,35 @@ def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float
 def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
     """Factor a matrix as L R with as many columns in L as its rank; null rows and columns stay exactly null."""
     rows, columns = matrix.any(axis=1), matrix.any(axis=0)
-    left, values, right = scipy.linalg.svd(matrix[np.ix_(rows, columns)], full_matrices=False)
+    part = matrix[np.ix_(rows, columns)]
+    down, across = equilibrating_powers(np.abs(part))
+    left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
     rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(matrix.shape) * values[0])) if values.size else 0
     speck = max(matrix.shape) * np.finfo(float).eps * (values[0] / values[rank - 1] if rank else 1.0)
     L, R = np.zeros((matrix.shape[0], rank), left.dtype), np.zeros((rank, matrix.shape[1]), right.dtype)
-    L[rows] = np.where(np.abs(left[:, :rank]) <= speck, 0.0, left[:, :rank]) * values[:rank]
-    R[:, columns] = np.where(np.abs(right[:rank]) <= speck, 0.0, right[:rank])
+    L[rows] = np.where(np.abs(left[:, :rank]) <= speck, 0.0, left[:, :rank]) * values[:rank] / down[:, None]
+    R[:, columns] = np.where(np.abs(right[:rank]) <= speck, 0.0, right[:rank]) / across
     return L, R
 
 
-def _equilibrated(coefficients: Sequence[Matrix]) -> tuple[Matrix, Matrix, Matrix]:
-    """Scale rows and columns so that the highest coefficient there is in each is near one."""
-    R0, R1, R2 = coefficients
-    rows, columns = equilibrating_powers(np.abs(R2))
-    for lower in (R1, R0):
-        size = np.abs(lower) * rows[:, None] * columns
-        empty_rows, empty_columns = ~R2.any(axis=1), ~R2.any(axis=0)
-        rows = np.where(empty_rows, rows * powers_of_two(size.max(axis=1, initial=0.0)), rows)
-        size = np.abs(lower) * rows[:, None] * columns
-        columns = np.where(empty_columns, columns * powers_of_two(size.max(axis=0, initial=0.0)), columns)
-    scale = rows[:, None] * columns
-    return R0 * scale, R1 * scale, R2 * scale
-
-
 def _time_scale(coefficients: Sequence[Matrix]) -> float:
-    """Give the power of two nearest to sqrt(|R_0| / |R_2|), or the like for the coefficients there are."""
-    sizes = [float(np.abs(matrix).max(initial=0.0)) for matrix in coefficients]
-    present = [power for power, size in enumerate(sizes) if size > 0.0]
-    if len(present) < 2:  # noqa: PLR2004
-        return 1.0
-    low, high = present[0], present[-1]
-    return float(2.0 ** np.round(np.log2(sizes[low] / sizes[high]) / (high - low)))
+    """Give a typical frequency as a power of two: the mean, in the logarithm, of what each row has to say.
+
+    A row with entries in R_h and R_l, h > l the highest and the lowest there are, balances at the frequency
+    ``(|R_l| / |R_h|)^(1 / (h - l))``, in any unit of the row.
+    """
+    sizes = np.array([np.abs(matrix).max(axis=1, initial=0.0) for matrix in coefficients])
+    logs = []
+    for row in sizes.T:
+        present = np.flatnonzero(row)
+        if present.size > 1:
+            low, high = present[0], present[-1]
+            logs.append(np.log2(row[low] / row[high]) / (high - low))
+    return float(2.0 ** np.round(np.mean(logs))) if logs else 1.0
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:
     """Sort by size, conjugate pairs with the positive imaginary part first."""
-    return values[np.lexsort((-values.imag, values.real, np.abs(values).round(12)))]
+    with np.errstate(divide="ignore"):
+        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
+    return values[np.lexsort((-values.imag, size))]

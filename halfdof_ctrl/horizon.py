@@ -27,7 +27,7 @@ NO_SCALE = 1.0  #: [s] horizon of a system whose modes give none: no poles, or i
 
 INTEGRATOR = 1e-12  #: poles below this part of the largest are at the origin
 ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that may have moved a pole off the origin
-ROUNDED_ZERO = 1e-6  #: no pole larger than this part of |A| is taken for one that was at the origin
+ROUNDED_ZERO = 1e-7  #: no pole above this part of the largest is taken for one that was at the origin
 RELEVANT = 1e-3  #: part of an output's movement that a mode must contribute
 NO_CHANNEL = 1e-12  #: channels that move less than this part of the largest are rounding
 SOUND = 1e-4  #: cosine between left and right eigenvectors below which (14) has terms that cancel
@@ -110,9 +110,11 @@ def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.
     balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
     values, left, right = (np.asarray(part) for part in scipy.linalg.eig(balanced, left=True, right=True))
     product = np.einsum("ik,ik->k", left.conj(), right)
-    cosine, norm = np.abs(product), np.linalg.norm(balanced, 2)
+    cosine = np.abs(product)
+    length = np.linalg.norm(right * scale[:, None], axis=0) * np.linalg.norm(left / scale[:, None], axis=0)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        rounding = np.minimum(ROUNDING * norm / cosine, ROUNDED_ZERO * norm)
+        rounding = ROUNDING * np.linalg.norm(A, 2) * length / cosine
+        rounding = np.minimum(rounding, ROUNDED_ZERO * np.abs(values).max())
         poles = np.where(np.abs(values) <= rounding, 0.0, values)
         to_outputs, from_inputs = np.abs(C * scale @ right), np.abs(left.conj().T @ (B / scale[:, None]))
         terms = to_outputs[:, None, :] * (from_inputs.T / (cosine * np.abs(poles)))

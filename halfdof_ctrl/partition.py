@@ -164,7 +164,7 @@ def _own_speeds(model: SecondOrderModel) -> FloatArray:
     """Give max(K_jj / M_jj, (C_jj / M_jj)^2) of the DOFs with M_jj, zero for others: the same in any unit of them."""
     mass, drag, stiffness = (np.abs(np.diagonal(matrix)) for matrix in (model.M, model.C, model.K))
     with_mass = np.where(mass > 0.0, mass, np.inf)
-    return np.maximum(stiffness / with_mass, (drag / with_mass) ** 2)
+    return np.asarray(np.maximum(stiffness / with_mass, (drag / with_mass) ** 2))
 
 
 def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofPartition:

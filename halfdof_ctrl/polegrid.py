@@ -15,9 +15,10 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from halfdof_ctrl.arrays import FloatArray
 
 WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
-AT_ORIGIN = 1e-9  #: points below this part of the largest |s| do not decide on that
+AT_ORIGIN = 1e-7  #: points below this part of the largest |s| do not decide on that
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
 SAME = 0.004  #: distance below which markers cover each other, as part of the axes
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
@@ -41,7 +42,7 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
             locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
             locator.set_params(numticks=9)
             axis.set_major_locator(locator)
-        ax.set_xlim(min(8.0 * left, -linear), max(8.0 * right, linear))
+        ax.set_xlim(min(8.0 * left, -10.0 * linear), max(8.0 * right, linear))
         top = max(8.0 * height, 10.0 * linear)
     else:
         width = max(right - left, 0.1 * height) or 1.0
@@ -53,11 +54,12 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
 def draw_pole_grid(ax: Axes) -> None:
     """Draw and label lines of equal damping ratio and of equal natural frequency within the limits."""
     reach = float(np.hypot(max(np.abs(ax.get_xlim())), max(np.abs(ax.get_ylim()))))
-    radii = np.geomspace(1e-9 * reach, reach, 600)
+    radii = np.geomspace(1e-12 * reach, reach, 900)
     last = _axes_coordinates(ax, 1j * radii)[_inside(ax, 1j * radii)][-1]
     for zeta in DAMPING_RATIOS:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
-        end = _axes_coordinates(ax, ray)[_inside(ax, ray)][-1]
+        inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
+        end = inside[-1] if inside.size else last
         if np.hypot(*(end - last)) < APART or np.hypot(*(end - (0.0, 0.5))) < APART:
             continue
         last = end
@@ -74,17 +76,18 @@ def draw_pole_grid(ax: Axes) -> None:
         if length[-1] > APART:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
-            if np.hypot(*(middle - last)) > APART:
-                ax.text(middle[0], middle[1], f"{radius:g} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
+            if np.hypot(*(middle - last)) > APART and middle[0] > EDGE:
+                ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
                 last = middle
 
 
 def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
     """Write how many points lie on the same spot, where it is more than one."""
-    left = _axes_coordinates(ax, points)
+    left, last = _axes_coordinates(ax, points), np.full(2, np.inf)
     while left.shape[0]:
         same = np.hypot(*(left - left[0]).T) < SAME
-        if np.count_nonzero(same) > 1:
+        if np.count_nonzero(same) > 1 and np.hypot(*(left[0] - last)) > APART:
+            last = left[0]
             ax.annotate(
                 f"{np.count_nonzero(same)}x",
                 tuple(left[same].mean(axis=0).tolist()),
@@ -104,6 +107,12 @@ def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:
         return 10.0 ** np.arange(np.ceil(np.log10(linear)), np.log10(reach), 1.0)
     ticks = np.asarray(MaxNLocator(5).tick_values(0.0, reach))
     return ticks[ticks > 0.0]
+
+
+def _number(value: float) -> str:
+    """Write a number, from 10^4 as a power of ten."""
+    exponent = round(np.log10(value))
+    return f"{value:g}" if -4 < exponent < 4 else rf"$10^{{{exponent}}}$"  # noqa: PLR2004
 
 
 def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:

@@ -117,8 +117,9 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
 def default_effort(model: SecondOrderModel) -> dict[str, float]:
     """Choose a weight of each input's square so that it costs about the energy that it stores.
 
-    That is ``|B^T P(jw)^-1 B| / 2``, half the receptance in the input's own direction, at the geometric mean w of
-    the sizes of the finite eigenvalues: its unit makes the square of the input an energy, whatever the input is.
+    That is ``|B(s)^T P(s)^-1 B(s)| / 2``, half the receptance in the input's own direction, where s is the geometric
+    mean of the sizes of the finite eigenvalues (real, off all resonances): its unit makes the square of the input
+    an energy, whatever the input is.
 
     Parameters
     ----------
@@ -143,23 +144,33 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     """
     size = np.abs(pencil_structure(model).finite_eigenvalues)
     moving = size[size > 1e-9 * size.max(initial=0.0)]
-    frequency = float(np.exp(np.log(moving).mean())) if moving.size else 1.0
-    to_motion = model.select(outputs=list(model.dofs))
-    motion = to_motion(1j * frequency, squeeze=False)
-    force = model.B + 1j * frequency * model.Bv - frequency**2 * model.Ba
+    s = float(np.exp(np.log(moving).mean())) if moving.size else 1.0
+    motion = model.select(outputs=list(model.dofs))(s, squeeze=False)
+    force = model.B + s * model.Bv + s**2 * model.Ba
     stored = np.abs(np.einsum("ij,ij->j", force, motion)) / 2.0
     idle = [name for name, value in zip(model.inputs, stored, strict=True) if not (np.isfinite(value) and value > 0.0)]
     if idle:
         msg = (
-            f"There is no default effort for {listed(idle)}, which moves nothing at {frequency:.4g} rad/s. Give "
-            "the weights, or leave the input out."
+            f"There is no default effort for {listed(idle)}, which moves nothing at s = {s:.4g} rad/s. Give the "
+            "weights, or leave the input out."
         )
         raise WeightError(msg, names=tuple(idle))
     return dict(zip(model.inputs, stored.tolist(), strict=True))
 
 
 def default_design(model: SecondOrderModel) -> tuple[StateFeedback, str]:
-    """Design the regulator with weight 1/J on the energy and `default_effort`; say in words what it minimizes."""
+    """Design the regulator with weight 1/J on the energy and `default_effort`; say in words what it minimizes.
+
+    Raises
+    ------
+    WeightError
+        No default effort, no energy, or no states to regulate.
+    StabilizationError
+        No stabilizing gain.
+    """
+    if pencil_structure(model).finite_eigenvalues.size == 0:
+        msg = "The model has no states, only static DOFs: there is nothing to regulate."
+        raise WeightError(msg, names=model.dofs)
     effort = default_effort(model)
     feedback = lqr(model, energy=1.0, effort=effort)
     efforts = ", ".join(f"{weight:.3g} {name}^2" for name, weight in effort.items())
@@ -267,6 +278,7 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
         if made.plot.axes.shape[1] == 1:
             made.plot.figure.set_figwidth(COLUMN_WIDTH)
         made.plot.figure.savefig(folder / f"{made.stem}.svg", metadata={"Date": None})
+        made.plot.figure.set_layout_engine("none")  # it stays as it is, which takes half the time
         save_figure(made.plot, folder / f"{made.stem}.png")
         svg = (folder / f"{made.stem}.svg").read_bytes()
         figures.append(PageFigure(made.stem, made.title, made.description, svg))
@@ -281,7 +293,7 @@ def _require_own_folder(target: Path, given: PathLike) -> None:
     index = target / INDEX
     foreign = index.exists() and not (index.is_file() and MARK in index.read_text("utf-8", errors="replace"))
     if foreign or (target.exists() and not target.is_dir()):
-        msg = f"{given}: there is something of that name that is no report of ours. Choose another folder."
+        msg = f"{given}: there is something of that name that is no report. Choose another folder."
         raise FileFormatError(msg, path=str(given))
 
 

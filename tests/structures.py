@@ -11,6 +11,12 @@ from hypothesis import strategies as st
 from halfdof_ctrl import SecondOrderModel, mechss
 
 IntArray = npt.NDArray[np.int64]
+FloatArray = npt.NDArray[np.float64]
+
+
+def on_axis(omega: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+    """Give the points ``j omega``."""
+    return np.asarray(1j * np.asarray(omega, dtype=float), dtype=np.complex128)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +36,11 @@ class Structure:
     @property
     def size(self) -> int:
         """Number of DOFs."""
-        return self.M.shape[0]
+        return int(self.M.shape[0])
+
+    def transformed(self, left: FloatArray, right: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Give M, C, K multiplied from both sides."""
+        return left @ self.M @ right, left @ self.C @ right, left @ self.K @ right
 
     def model(self, **options: Any) -> SecondOrderModel:  # noqa: ANN401  # those of mechss
         """Make the model, with forces on and displacements of all DOFs unless told otherwise."""

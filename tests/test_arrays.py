@@ -129,7 +129,7 @@ def test_list_becomes_the_row_or_column_that_is_meant(shape: tuple[int, int]) ->
 @pytest.mark.parametrize("value", [[[1, "2"], [3, 4]], np.array([["1", 2], [3, 4]], dtype=object), [["1"]], [[b"1"]]])
 def test_digits_in_text_are_not_numbers(value: object) -> None:
     """A column read as text from a file is refused, not parsed."""
-    with pytest.raises(MatrixError, match="K holds entries of type|K is not a matrix of numbers"):
+    with pytest.raises(MatrixError, match=r"K holds entries of type|K is not a matrix of numbers"):
         checked_matrix(value, "K")
 
 

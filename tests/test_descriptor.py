@@ -10,8 +10,8 @@ from structures import Structure, damped_structures, structures
 from test_paper import paired
 
 from halfdof_ctrl import exact_reduction, hydromount, mechss, pencil_structure, zeros
-from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.descriptor import require_regular
+from halfdof_ctrl.errors import SingularPencilError
 
 ROUNDOFF = 1e-11  # eigenvalues of a few well-conditioned unknowns by QZ
 COMPARED = 1e-7  # random structures have eigenvalues of condition up to 1e8
@@ -75,7 +75,7 @@ def test_eigenvalues_come_in_order_of_size() -> None:
     ],
     ids=["mass", "damper", "spring", "held by a multiplier", "two masses tied", "velocity held by a multiplier"],
 )
-def test_known_structures_have_their_index(  # noqa: PLR0917
+def test_known_structures_have_their_index(
     M: np.ndarray | None, C: np.ndarray | None, K: np.ndarray, index: int, order: int
 ) -> None:
     """Position constraints have index three, velocity constraints two, springs alone one."""

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from structures import on_axis
 
 from halfdof_ctrl import evaluation
 from halfdof_ctrl.evaluation import quadratic_transfer
@@ -24,7 +25,7 @@ def test_values_equal_the_formula_point_by_point(seed: int, n: int) -> None:
     generator = np.random.default_rng(seed)
     P, B, F, D = (coefficients(generator, *shape) for shape in ((n, n), (n, 2), (3, n), (3, 2)))
     P = (P[0] + 6 * np.eye(n), *P[1:])
-    points = generator.standard_normal(5) * 0.3 + 0.2j
+    points = np.asarray(generator.standard_normal(5) * 0.3 + 0.2j, dtype=np.complex128)
     values = quadratic_transfer(P, B, F, D, points)
     for k, s in enumerate(points):
         Ps, Bs, Fs, Ds = (part[0] + s * part[1] + s**2 * part[2] for part in (P, B, F, D))
@@ -36,7 +37,7 @@ def test_batches_join_without_a_seam(monkeypatch: pytest.MonkeyPatch) -> None:
     """Points that are worked in several batches give the values of one batch."""
     generator = np.random.default_rng(1)
     P, B, F, D = (coefficients(generator, *shape) for shape in ((3, 3), (3, 1), (1, 3), (1, 1)))
-    points = 1j * np.linspace(0.1, 9.0, 23)
+    points = on_axis(np.linspace(0.1, 9.0, 23))
     whole = quadratic_transfer(P, B, F, D, points)
     monkeypatch.setattr(evaluation, "BATCH_ENTRIES", 45)
     assert_allclose(quadratic_transfer(P, B, F, D, points), whole, rtol=ROUNDOFF)
@@ -46,7 +47,7 @@ def test_only_the_singular_points_of_a_batch_are_infinite() -> None:
     """Poles at 1j, 2j, 3j among regular points."""
     squares = np.diag([1.0, 4.0, 9.0])
     zero, unit = np.zeros((3, 3)), np.eye(3)
-    points = 1j * np.array([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5])
+    points = on_axis([0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5])
     values = quadratic_transfer((squares, zero, unit), (unit, zero, zero), (unit, zero, zero), (zero,) * 3, points)
     infinite = np.isinf(values.real).any(axis=(0, 1))
     assert infinite.tolist() == [False, True, False, True, False, True, False]
@@ -62,6 +63,6 @@ def test_badly_scaled_equations_are_solved_to_rounding(seed: int) -> None:
     zero, unit = np.zeros((5, 5)), np.eye(5)
     scaled = P * rows[:, None] * columns
     values = quadratic_transfer(
-        (scaled, zero, zero), (np.diag(rows), zero, zero), (np.diag(columns), zero, zero), (zero,) * 3, np.zeros(1)
+        (scaled, zero, zero), (np.diag(rows), zero, zero), (np.diag(columns), zero, zero), (zero,) * 3, on_axis([0.0])
     )
     assert_allclose(values[:, :, 0], np.linalg.solve(P, unit), rtol=CORRECTED)

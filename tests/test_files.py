@@ -263,15 +263,11 @@ def test_names_in_bytes_are_read_as_text(tmp_path: Path) -> None:
     assert load_model(written_npz(tmp_path / "a.npz", K=K, dofs=np.array([b"y", b"z"]))).dofs == ("y", "z")
 
 
-def test_a_matrix_too_large_to_be_held_is_not_unpacked(tmp_path: Path) -> None:
+def test_a_matrix_too_large_to_be_held_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A small archive may claim to hold any size."""
-    with (
-        zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive,
-        archive.open("K.npy", "w") as member,
-    ):
-        for _ in range(26):
-            member.write(bytes(2**24))
-    with pytest.raises(FileFormatError, match=r"K is larger than the 4e\+08 bytes that are read"):
+    monkeypatch.setattr("halfdof_ctrl.files.MOST_BYTES", 2e4)
+    np.savez_compressed(tmp_path / "a.npz", K=np.zeros((100, 100)))
+    with pytest.raises(FileFormatError, match=r"K is larger than the 2e\+04 bytes that are read"):
         load_model(tmp_path / "a.npz")
 
 
@@ -350,7 +346,9 @@ def test_a_damaged_file_loads_or_is_refused_by_name(
         content[place] = data.draw(st.integers(0, 255))
     path.write_bytes(content)
     try:
-        refusal = repr(load_model(path)) and ""
+        load_model(path)
+        refusal = f"{path}: none"
     except HalfdofError as caught:
         refusal = str(caught)
-    assert not refusal or (refusal.startswith(str(path)) and "\n" not in refusal)
+    assert refusal.startswith(str(path))
+    assert "\n" not in refusal

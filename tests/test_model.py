@@ -76,8 +76,9 @@ def test_wrong_matrices_are_refused_by_letter(arguments: dict[str, object], word
 
 def test_sparse_matrices_are_taken() -> None:
     """Sparse arrays give the model of their dense form."""
-    matrices = [scipy.sparse.csc_array(matrix) for matrix in (np.eye(2), np.eye(2), 2 * np.eye(2))]
-    model = mechss(*matrices, B=scipy.sparse.csr_array([[1.0], [0.0]]))
+    M, C, K = (scipy.sparse.csc_array(matrix) for matrix in (np.eye(2), np.eye(2), 2 * np.eye(2)))
+    B = scipy.sparse.csr_array([[1.0], [0.0]])
+    model = mechss(M, C, K, B)  # type: ignore[arg-type]  # npt.ArrayLike does not know sparse arrays
     assert_array_equal(model.K, 2 * np.eye(2))
     assert model.inputs == ("F_q0",)
 

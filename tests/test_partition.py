@@ -64,7 +64,8 @@ def test_what_needs_no_mixing_keeps_its_name() -> None:
     assert part.inertial == ("mix0",)
     assert part.half == ("c",)
     assert set(part.static) == {"mix1", "d"}
-    assert [(decision.matrix, decision.dofs, decision.rank) for decision in part.evidence][0] == ("M", ("a", "b"), 1)
+    first = part.evidence[0]
+    assert (first.matrix, first.dofs, first.rank) == ("M", ("a", "b"), 1)
 
 
 def test_names_of_mixtures_are_clear_of_the_dofs() -> None:

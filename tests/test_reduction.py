@@ -8,7 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from structures import Structure, damped_structures, passive, semidefinite, structures
+from structures import Structure, damped_structures, on_axis, passive, semidefinite, structures
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.errors import (
@@ -26,7 +26,7 @@ LOSS = 64  # times eps / rcond(W): what the solve of (3) may lose where W is ill
 METAMORPHIC = 1e-9  # the transformed model is rounded once more, in every entry
 ROUNDOFF = 1e-12  # a few operations on well-conditioned small matrices
 RESIDUAL = 1e-9  # of the equation of motion, relative to the largest force; python-control integrates by expm
-POINTS = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s], none a pole of small-integer matrices
+POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
 
 
 def reduced(structure: Structure) -> ExactReduction:
@@ -112,7 +112,7 @@ def test_load_on_a_massless_dof_through_a_damper(dof: int) -> None:
     sys = mech2ss(M, C, K, np.eye(2)[:, [dof]])
     assert sys.nstates == 3
     assert_allclose(sys(0).ravel(), np.linalg.solve(K, np.eye(2)[:, dof]), rtol=ROUNDOFF)
-    s = 1j * np.geomspace(1e-2, 1e5, 50)
+    s = on_axis(np.geomspace(1e-2, 1e5, 50))
     exact_values = exact.transfer(mechss(M, C, K, np.eye(2)[:, [dof]]), s)
     assert_same_transfer(response(sys, s), exact_values, ROUNDOFF)
 
@@ -131,7 +131,7 @@ def test_units_of_dofs_and_equations_change_nothing(structure: Structure, column
     """DOFs in units of 10^k, equations multiplied by 10^l: same kinds of DOF, same transfer function."""
     n = structure.size
     S, R = np.diag(10.0 ** np.array(columns[:n])), np.diag(10.0 ** np.array(rows[:n]))
-    scaled = mechss(*(R @ matrix @ S for matrix in structure.matrices), R, S)
+    scaled = mechss(*structure.transformed(R, S), R, S)
     plain, other = exact_reduction(structure.model()), exact_reduction(scaled)
     assert other.partition.coordinates == plain.partition.coordinates
     assert (other.order, other.method) == (plain.order, plain.method)
@@ -146,7 +146,7 @@ def test_units_do_not_change_rank_decisions_of_mixed_coordinates(
     plain = reduced(structure)
     n = structure.size
     S, R = np.diag(2.0 ** np.array(columns[:n])), np.diag(2.0 ** np.array(rows[:n]))
-    scaled = mechss(*(R @ matrix @ S for matrix in structure.matrices))
+    scaled = mechss(*structure.transformed(R, S))
     assert exact_reduction(scaled, method="orthogonal").order == plain.order
 
 
@@ -156,7 +156,7 @@ def test_unit_of_time_moves_only_the_frequency(structure: Structure, power: int)
     tau = 10.0**power
     M, C, K = structure.matrices
     sys, slow = mech2ss(M, C, K), mech2ss(M * tau**2, C * tau, K)
-    assert_same_transfer(response(slow, POINTS / tau), response(sys), METAMORPHIC)
+    assert_same_transfer(response(slow, np.asarray(POINTS / tau)), response(sys), METAMORPHIC)
 
 
 @given(structure=damped_structures(), seed=st.integers(0, 2**32 - 1))
@@ -164,12 +164,12 @@ def test_congruence_changes_nothing(structure: Structure, seed: int) -> None:
     """``T^T M T`` with an integer T of determinant one has the order and, through T, the transfer function."""
     generator = np.random.default_rng(seed)
     n = structure.size
-    T = np.eye(n, dtype=np.int64)
+    T = np.eye(n)
     for _ in range(n):
         i, j = generator.integers(0, n, 2)
         T[i] += 0 if i == j else int(generator.integers(-1, 2)) * T[j]
     plain = exact_reduction(structure.model())
-    mixed = exact_reduction(mechss(*(T.T @ matrix @ T for matrix in structure.matrices), T.T, T))
+    mixed = exact_reduction(mechss(*structure.transformed(T.T, T), T.T, T))
     assert mixed.order == plain.order
     assert_same_transfer(response(mech2ss(mixed)), response(mech2ss(plain)), METAMORPHIC)
 
@@ -180,8 +180,8 @@ def test_order_of_dofs_and_signals_permutes_the_channels(structure: Structure, s
     generator = np.random.default_rng(seed)
     shuffle, causes, effects = (generator.permutation(structure.size) for _ in range(3))
     plain = response(mech2ss(structure.model()))
-    matrices = [matrix[np.ix_(shuffle, shuffle)] for matrix in structure.matrices]
     unit = np.eye(structure.size)
+    matrices = structure.transformed(unit[shuffle], unit[:, shuffle])
     permuted = mech2ss(*matrices, unit[shuffle][:, causes], unit[effects][:, shuffle])
     assert_same_transfer(response(permuted), plain[np.ix_(effects, causes)], METAMORPHIC)
 
@@ -207,7 +207,7 @@ def test_response_at_rest_is_the_flexibility(structure: Structure, seed: int) ->
     B, F, D = (generator.integers(-3, 4, shape) for shape in ((structure.size, 2), (3, structure.size), (3, 2)))
     sys = mech2ss(*structure.matrices, B, F, D=D)
     desired = F @ np.linalg.solve(structure.K, B) + D
-    assert_allclose(response(sys, np.zeros(1, complex))[:, :, 0], desired, rtol=0.0, atol=METAMORPHIC * 10)
+    assert_allclose(response(sys, on_axis([0.0]))[:, :, 0], desired, rtol=0.0, atol=METAMORPHIC * 10)
 
 
 def prescribed(structure: Structure, dof: int) -> SecondOrderModel:
@@ -217,7 +217,9 @@ def prescribed(structure: Structure, dof: int) -> SecondOrderModel:
     n = len(free)
     unit, zero = np.eye(n), np.zeros((n, n))
     return mechss(
-        *(matrix[np.ix_(free, free)] for matrix in structure.matrices),
+        M[np.ix_(free, free)],
+        C[np.ix_(free, free)],
+        K[np.ix_(free, free)],
         -K[free, dof],
         np.vstack([unit, K[[dof]][:, free]]),
         np.vstack([zero, C[[dof]][:, free]]),
@@ -380,6 +382,23 @@ def test_unknown_dof_in_initial_values_is_refused() -> None:
     """The error lists the DOFs that there are."""
     with pytest.raises(SignalNameError, match=r"no DOF 'z'. Known: y, y1, y2"):
         exact_reduction(hydromount()).state({"z": 1.0})
+
+
+@pytest.mark.parametrize("tol", [float("nan"), -1.0, 2.0, float("inf"), "small"])
+def test_tolerance_that_is_no_small_number_is_refused(tol: object) -> None:
+    """With NaN or 2 every mass would count as none."""
+    with pytest.raises(ParameterError, match="tol"):
+        exact_reduction(hydromount(), tol=tol)  # type: ignore[arg-type]
+
+
+def test_free_motion_is_recovered() -> None:
+    """python-control's initial_response has no inputs in it; all DOFs follow all the same."""
+    model = hydromount()
+    reduction, time = exact_reduction(model), np.linspace(0, 1, 20)
+    data = control.initial_response(mech2ss(model), time, reduction.state({"y": 0.01}))
+    motion = reduction.recover(data)
+    assert_allclose(motion.displacement, data.y, rtol=0.0, atol=ROUNDOFF)
+    assert_allclose(motion["y1_dot"], -10 * data.x[1] + data.x[3], rtol=0.0, atol=ROUNDOFF)
 
 
 @pytest.mark.parametrize("given_values", [[1.0], [1.0, 2.0], [[1.0, 0.0, 0.0]], 1.0])

@@ -6,6 +6,8 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
+import control
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -64,6 +66,18 @@ class Page(HTMLParser):
         self.text += data
 
 
+@pytest.fixture
+def quick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw empty figures where figures are not what is tested."""
+
+    def empty(*_: object, **__: object) -> control.ControlPlot:
+        figure, axes = plt.subplots(squeeze=False)
+        return control.ControlPlot(np.empty((1, 1), dtype=object), axes, figure)
+
+    for name in ("bode_plot", "step_plot", "pole_map_plot"):
+        monkeypatch.setattr(f"halfdof_ctrl.report.{name}", empty)
+
+
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Write the mount's report once."""
@@ -103,6 +117,7 @@ def test_the_page_says_what_the_paper_says(written: Path) -> None:
     assert text.count("infinite\n") + text.count("infinitenone") >= 2
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_second_report_replaces_the_first_and_spares_other_files(tmp_path: Path) -> None:
     """Files of the user in the folder are left alone."""
     folder = tmp_path / "report"
@@ -119,9 +134,9 @@ def test_a_page_of_someone_else_is_not_replaced(tmp_path: Path) -> None:
     """An index.html that is no report of ours stays, and so does a file of the folder's name."""
     (tmp_path / "index.html").write_text("<p>my page</p>")
     (tmp_path / "file").write_text("")
-    with pytest.raises(FileFormatError, match="no report of ours. Choose another folder"):
+    with pytest.raises(FileFormatError, match="that is no report"):
         write_report(MOUNT, tmp_path)
-    with pytest.raises(FileFormatError, match="no report of ours"):
+    with pytest.raises(FileFormatError, match="that is no report"):
         write_report(MOUNT, tmp_path / "file")
     assert {file.name for file in tmp_path.iterdir()} == {"index.html", "file"}
 
@@ -149,6 +164,7 @@ def test_a_missing_parent_folder_is_named(tmp_path: Path) -> None:
         write_report(MOUNT, tmp_path / "no" / "report")
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_failure_on_the_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The folder appears when it is complete."""
 
@@ -161,6 +177,7 @@ def test_a_failure_on_the_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("quick")
 def test_the_report_says_why_there_is_no_regulator(tmp_path: Path) -> None:
     """A mode that the input does not reach and that is not stable: in the words of the error."""
     free = mechss(np.eye(2), np.zeros((2, 2)), np.diag([4.0, 0.0]), dofs=["a", "b"]).select("F_a", "a")
@@ -170,25 +187,26 @@ def test_the_report_says_why_there_is_no_regulator(tmp_path: Path) -> None:
     assert "no input reaches it" in Page((tmp_path / "report" / "index.html").read_text()).text
 
 
+@pytest.mark.usefixtures("quick")
 def test_many_channels_are_cut_in_the_figures_and_the_page_says_so(tmp_path: Path) -> None:
     """Nine channels would be too small to read; the state space keeps them."""
     report = write_report(hydromount(), tmp_path / "report")
-    assert report.notes == (
-        "Bode diagram and step response show y, y1, y2 from F_y, F_y1 only, of 3 outputs and 3 inputs; select others "
-        "to see them.",
-    )
+    (note,) = report.notes
+    assert "show y, y1, y2 from F_y, F_y1 only, of 3 outputs and 3 inputs; select others" in note
     assert load_system(tmp_path / "report" / "statespace.npz").ninputs == 3
 
 
+@pytest.mark.usefixtures("quick")
 def test_a_warning_of_the_model_stands_in_the_report_and_is_given_once(tmp_path: Path) -> None:
     """A nearly massless DOF is worth a note to who reads the page."""
-    model = mechss(np.diag([1.0, 1e-13]), np.eye(2), np.eye(2) * 2.0 - 1.0, dofs=["a", "b"])
+    model = mechss(np.diag([1.0, 1e-13]), np.eye(2), np.diag([4.0, 1.0]), dofs=["a", "b"])
     with pytest.warns(NearlyMasslessWarning, match="DOFs b have a mass") as caught:
         report = write_report(model.select("F_a", "a"), tmp_path / "report")
     assert len(caught) == 1
     assert "DOFs b have a mass" in report.notes[0]
 
 
+@pytest.mark.usefixtures("quick")
 def test_names_cannot_break_the_page(tmp_path: Path) -> None:
     """Markup in a name is text."""
     model = mechss([[1.0]], [[1.0]], [[2.0]], dofs=["<b>&"], name="</title><script>alert(1)</script>")
@@ -202,11 +220,11 @@ def test_a_model_without_states_has_a_report(tmp_path: Path) -> None:
     """A spring alone: no poles, no regulator, a constant response."""
     report = write_report(mechss([[0.0]], None, [[4.0]]), tmp_path / "report")
     assert report.eigenvalues.order == 0
+    assert "nothing to regulate" in report.notes[-1]
 
 
-def test_the_default_effort_has_the_unit_of_an_energy(tmp_path: Path) -> None:
+def test_the_default_effort_has_the_unit_of_an_energy() -> None:
     """A change of the unit of a DOF, and so of its force, changes the weight as the square of the input."""
-    del tmp_path
     scale = 1000.0
     weight = default_effort(MOUNT)["F_y"]
     in_mm = mechss(MOUNT.M / scale**2, MOUNT.C / scale**2, MOUNT.K / scale**2, dofs=["y", "y1", "y2"])

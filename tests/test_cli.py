@@ -1,0 +1,295 @@
+"""Claims about the command: what it writes and prints, and how it refuses."""
+
+import csv
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import control
+import numpy as np
+import pytest
+
+from halfdof_ctrl import frequency_response, hydromount, mech2ss, mechss
+from halfdof_ctrl.cli import main
+from halfdof_ctrl.crosscheck import CrossCheck
+from halfdof_ctrl.design import lqr
+from halfdof_ctrl.errors import HalfdofError
+from halfdof_ctrl.files import load_system, save_model
+
+COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
+ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
+MOUNT = hydromount().select("F_y", ["y", "y_dot"])
+
+
+@pytest.fixture(autouse=True)
+def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let relative paths lead into a folder of the test."""
+    monkeypatch.chdir(tmp_path)
+
+
+def failing(check: CrossCheck) -> CrossCheck:
+    """Let a check miss a state."""
+    values = {key: getattr(check, key) for key in check.__slots__}
+    return CrossCheck(**{**values, "n_finite": check.n_finite + 1, "max_pole_error": float("inf")})
+
+
+def table(path: str) -> list[list[str]]:
+    """Read a csv."""
+    return list(csv.reader(Path(path).read_text(encoding="utf-8").splitlines()))
+
+
+def test_report_writes_the_folder_and_prints_the_papers_table(capsys: pytest.CaptureFixture[str]) -> None:
+    """Eigenvalues before and after, with the infinite ones, and the check."""
+    assert main(["report", "hydromount", "-o", "report"]) == 0
+    printed = capsys.readouterr()
+    for words in ("-0.6897 ± 17.7059i", "-8.7797", "-3.1742", "2 infinite eigenvalues", "Cross-check passed"):
+        assert words in printed.out
+    assert printed.out.count("infinite             none") == 2
+    assert printed.err == ""
+    assert Path("report/index.html").is_file()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["poles", "hydromount", "-o", "a.png"], ["bode", "hydromount", "--hz", "--db", "-o", "a.svg"]]
+)
+def test_figures_have_the_format_of_their_ending(arguments: list[str]) -> None:
+    """PNG and SVG by their first bytes."""
+    assert main(arguments) == 0
+    content = Path(arguments[-1]).read_bytes()
+    assert content.startswith(b"\x89PNG") if arguments[-1].endswith("png") else b"<svg" in content
+
+
+@pytest.mark.parametrize("command", ["step", "lqr"])
+def test_pdf_figures_are_written(command: str) -> None:
+    """The step response and the pole map with the regulator, without a display."""
+    assert main([command, "hydromount", "--outputs", "y", "-o", "a.pdf"]) == 0
+    assert Path("a.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_bode_numbers_are_those_of_frequency_response() -> None:
+    """At the frequencies asked for, the limits being points."""
+    assert main(["bode", "hydromount", "--omega-min", "1", "--omega-max", "100", "--points", "3", "-o", "a.csv"]) == 0
+    rows = table("a.csv")
+    assert [float(row[0]) for row in rows[1:]] == pytest.approx([1.0, 10.0, 100.0], rel=1e-14)
+    exact = np.asarray(frequency_response(MOUNT, [float(row[0]) for row in rows[1:]]).frdata)[0, 0]
+    np.testing.assert_array_equal([complex(float(row[2]), float(row[3])) for row in rows[1:]], exact)
+
+
+def test_a_single_limit_keeps_the_other_one() -> None:
+    """The default grid reaches from a tenth of the slowest to ten times the fastest pole."""
+    assert main(["bode", "hydromount", "--omega-max", "5", "-o", "a.csv"]) == 0
+    omega = [float(row[0]) for row in table("a.csv")[1:]]
+    assert [omega[0], omega[-1]] == pytest.approx([0.3174, 5.0], rel=1e-3)
+
+
+def test_step_numbers_include_the_recovered_half_dofs() -> None:
+    """As the figure shows them; the last time is the one asked for."""
+    assert main(["step", "hydromount", "--time", "2", "-o", "a.csv"]) == 0
+    rows = table("a.csv")
+    assert rows[0] == ["t [s]", "y/F_y", "y_dot/F_y", "y1/F_y", "y2/F_y"]
+    exact = control.step_response(mech2ss(MOUNT), np.array([float(row[0]) for row in rows[1:]]), squeeze=False)
+    assert float(rows[-1][0]) == 2.0
+    np.testing.assert_allclose([float(row[1]) for row in rows[1:]], np.asarray(exact.y)[0, 0], rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_ss_writes_the_state_space_of_a_model_file(ending: str) -> None:
+    """From one file to the other, in both formats."""
+    model = mechss(np.diag([1.0, 0.0]), np.eye(2), [[3.0, -1.0], [-1.0, 2.0]], dofs=["101.1", "b"])
+    save_model(model, f"model.{ending}")
+    assert main(["ss", f"model.{ending}", "--outputs", "b,101.1_dot", "-o", f"sys.{ending}"]) == 0
+    expected = mech2ss(model.select(outputs=["b", "101.1_dot"]))
+    np.testing.assert_array_equal(load_system(f"sys.{ending}").C, expected.C)
+    assert load_system(f"sys.{ending}").output_labels == ["b", "101:1_dot"]
+
+
+def test_ss_and_info_print_what_python_prints(capsys: pytest.CaptureFixture[str]) -> None:
+    """The state space with its labels; the model, its pencil and its reduction."""
+    assert main(["ss", "hydromount"]) == 0
+    assert main(["info", "hydromount"]) == 0
+    printed = capsys.readouterr().out
+    assert str(mech2ss(MOUNT)) in printed
+    assert repr(MOUNT) in printed
+    assert "Pencil: regular, 4 finite and 2 infinite eigenvalues, index 0" in printed
+    assert "ExactReduction by selection: 4 states" in printed
+
+
+def test_info_says_why_a_model_has_no_state_space(capsys: pytest.CaptureFixture[str]) -> None:
+    """To learn that is what info is for."""
+    save_model(mechss([[1.0]], None, [[1.0 + 0.1j]]), "model.npz")
+    assert main(["info", "model.npz"]) == 0
+    assert "No state space: K has imaginary parts" in capsys.readouterr().out
+
+
+def test_parameters_and_signals_of_the_mount_can_be_chosen(capsys: pytest.CaptureFixture[str]) -> None:
+    """-p changes a parameter, repeatedly; --inputs and --outputs pick any signal."""
+    assert main(["ss", "hydromount", "-p", "C_h=450", "-p", "m=10", "--inputs", "F_y,F_y2", "--outputs=y2"]) == 0
+    expected = mech2ss(hydromount(C_h=450.0, m=10.0).select(["F_y", "F_y2"], "y2"))
+    assert str(expected) in capsys.readouterr().out
+
+
+def test_poles_prints_the_table_before_and_after(capsys: pytest.CaptureFixture[str]) -> None:
+    """The paper's."""
+    assert main(["poles", "hydromount"]) == 0
+    assert "-0.6897 ± 17.7059i   -0.6897 ± 17.7059i" in capsys.readouterr().out
+
+
+def test_lqr_prints_and_writes_the_gain_of_the_weights(capsys: pytest.CaptureFixture[str]) -> None:
+    """Weights by physical quantity, several in one option or in several."""
+    weights = ["--displacement", "y=1e6,y1=2", "--velocity", "y=3", "--acceleration", "y=4", "--effort", "F_y=1e-4"]
+    assert main(["lqr", "hydromount", *weights, "--energy", "5", "-o", "gain.csv"]) == 0
+    expected = lqr(
+        MOUNT,
+        displacement={"y": 1e6, "y1": 2.0},
+        velocity={"y": 3.0},
+        acceleration={"y": 4.0},
+        effort={"F_y": 1e-4},
+        energy=5.0,
+    )
+    assert [float(gain) for gain in table("gain.csv")[1][1:]] == expected.K[0].tolist()
+    assert repr(expected) in capsys.readouterr().out
+
+
+def test_lqr_without_weights_takes_the_default_design_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    """The one of the report."""
+    assert main(["lqr", "hydromount"]) == 0
+    assert "minimizes the integral of the mechanical energy [J] plus" in capsys.readouterr().out
+
+
+def test_check_passes_and_writes_its_figures(capsys: pytest.CaptureFixture[str]) -> None:
+    """As JSON."""
+    assert main(["check", "hydromount", "-o", "check.json"]) == 0
+    assert "Cross-check passed" in capsys.readouterr().out
+    assert json.loads(Path("check.json").read_text(encoding="utf-8"))["n_infinite"] == 2
+
+
+def test_a_failed_check_is_exit_code_one(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the files written, and numbers that JSON does not know as null."""
+    from halfdof_ctrl import crosscheck  # noqa: PLC0415
+
+    for module in ("cli", "report"):
+        monkeypatch.setattr(f"halfdof_ctrl.{module}.crosscheck", lambda *given: failing(crosscheck(*given)))
+    assert main(["check", "hydromount", "-o", "check.json"]) == 1
+    assert main(["report", "hydromount", "--outputs", "y", "-o", "report"]) == 1
+    assert "Cross-check FAILED" in capsys.readouterr().out
+    assert json.loads(Path("check.json").read_text(encoding="utf-8"))["max_pole_error"] is None
+    assert "Cross-check FAILED" in Path("report/index.html").read_text(encoding="utf-8")
+
+
+REFUSALS = [
+    ("info hydromunt", "hydromunt: neither a file nor a built-in model. Built in: hydromount."),
+    ("info model.npz", "model.npz: No such file or directory"),
+    ("info bad.npz", "bad.npz: this is no archive of arrays"),
+    ("info bad.npz -p C_h=1", "-p changes parameters of built-in models (hydromount); bad.npz is a file."),
+    ("bode hydromount -o a.gif", "a.gif: the ending .gif names no format for this. Use .png, .svg, .pdf, .csv."),
+    ("ss hydromount -o a.csv", "a.csv: the ending .csv names no format for this. Use .npz, .mat."),
+    ("check hydromount -o a.txt", "Use .json."),
+    ("poles hydromount -o a.csv", "Use .png, .svg, .pdf."),
+    ("bode hydromount -p C_h=a -o a.png", "-p C_h must be a number, not 'a'."),
+    ("bode hydromount -p C_h -o a.png", "-p takes a name and a number, NAME=VALUE, not 'C_h'."),
+    ("bode hydromount -p m=1 -p m=2 -o a.png", "-p gives m twice."),
+    ("bode hydromount -p c=1 -o a.png", "hydromount has no parameter 'c'. Known: m, K_r"),
+    ("bode hydromount -p m=0 -o a.png", "the mass on the mount must be positive"),
+    ("bode hydromount -p m=nan -o a.png", "the mass on the mount must be positive"),
+    ("bode hydromount --inputs F_q -o a.png", "The model has no input 'F_q'. Known: F_y, F_y1, F_y2."),
+    ("bode hydromount --outputs , -o a.png", "No output is selected"),
+    ("bode hydromount --omega-min 5 --omega-max 1 -o a.csv", "must be positive and rise"),
+    ("bode hydromount --omega-min nan -o a.csv", "must be positive and rise"),
+    ("bode hydromount --points 1 -o a.csv", "--points 1, but a range of frequencies has 2 to 1000000 of them."),
+    ("bode hydromount -o no/a.png", "no/a.png: No such file or directory"),
+    ("bode hydromount -o bad.npz/a.png", "bad.npz/a.png: Not a directory"),
+    ("step hydromount --time -1 -o a.png", "must be a positive number of seconds, not -1.0"),
+    ("step hydromount --time nan -o a.csv", "must be a positive number of seconds"),
+    ("lqr hydromount --energy 1", "The inputs F_y cost nothing"),
+    ("lqr hydromount --displacement q=1 --effort F_y=1", "no DOF 'q'"),
+    ("ss hydromount --inputs F_y1 --outputs y1_ddot", "y1_ddot from F_y1 (grows as s^1)"),
+    ("report hydromount --inputs F_y1 --outputs y1_ddot -o report", "y1_ddot from F_y1 (grows as s^1)"),
+    ("report hydromount -o bad.npz", "bad.npz: there is something of that name that is no report"),
+]
+
+
+@pytest.mark.parametrize(("line", "message"), REFUSALS)
+def test_what_is_refused_gets_one_line_and_exit_code_two(
+    line: str, message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On stderr, with nothing written and nothing printed."""
+    Path("bad.npz").write_bytes(b"M = 1")
+    assert main(line.split()) == 2
+    printed = capsys.readouterr()
+    assert message in printed.err
+    assert printed.err.startswith("halfdof-ctrl: error: ")
+    assert (printed.err.count("\n"), printed.out) == (1, "")
+    assert [file.name for file in Path().iterdir()] == ["bad.npz"]
+
+
+@pytest.mark.parametrize(
+    "line", ["", "nonsense hydromount", "bode", "bode hydromount", "bode hydromount --points x -o a.png", "ss a --abc"]
+)
+def test_what_the_parser_does_not_know_is_exit_code_two(line: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """With the usage, by argparse."""
+    with pytest.raises(SystemExit, match="2"):
+        main(line.split())
+    assert "usage: halfdof-ctrl" in capsys.readouterr().err
+
+
+def test_a_warning_is_one_line_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
+    """A nearly massless DOF, once."""
+    save_model(mechss(np.diag([1.0, 1e-13]), np.eye(2), np.eye(2), dofs=["a", "b"]), "model.npz")
+    assert main(["ss", "model.npz"]) == 0
+    printed = capsys.readouterr().err
+    assert printed.startswith("halfdof-ctrl: warning: DOFs b have a mass of at most")
+    assert printed.count("\n") == 1
+
+
+def test_an_interrupt_is_silent_and_exit_code_130(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As shells report it."""
+
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("halfdof_ctrl.cli.mech2ss", interrupted)
+    assert main(["ss", "hydromount"]) == 130
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_refusal_of_many_lines_is_printed_as_one(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever stands in a name or in a message of another library."""
+
+    def refused(*_: object) -> None:
+        msg = "two\nlines"
+        raise HalfdofError(msg)
+
+    monkeypatch.setattr("halfdof_ctrl.cli.mech2ss", refused)
+    assert main(["ss", "hydromount"]) == 2
+    assert capsys.readouterr().err == "halfdof-ctrl: error: two lines\n"
+
+
+def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    """That of the installed package."""
+    with pytest.raises(SystemExit, match="0"):
+        main(["--version"])
+    assert capsys.readouterr().out.startswith("halfdof-ctrl 0.")
+
+
+def test_the_command_runs_as_a_process_of_its_own(tmp_path: Path) -> None:
+    """A refusal, a terminal without ±, and a reader that goes away."""
+    environment = {**ENVIRONMENT, "PYTHONIOENCODING": "ascii"}
+    done = subprocess.run(
+        [*COMMAND, "poles", "hydromount"], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert r"-0.6897 \xb1 17.7059i" in done.stdout
+    with subprocess.Popen(
+        [*COMMAND, "info", "hydromount"], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == 141
