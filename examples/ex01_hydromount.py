@@ -41,7 +41,7 @@ def draw() -> control.ControlPlot:
         height_ratios=[1.4, 1.0],
         layout="constrained",
     )
-    bode_plot(mount(), Hz=True, ax=[axes["magnitude"], axes["phase"]])
+    bode_plot(mount(), Hz=True, ax=np.array([axes["magnitude"], axes["phase"]]))
     plot = pole_map_plot(mount(), ax=axes["map"])
     axes["magnitude"].tick_params(labelbottom=False)
     figure.align_ylabels([axes["magnitude"], axes["phase"]])

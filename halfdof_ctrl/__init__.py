@@ -4,9 +4,12 @@ from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, zeros
 from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.errors import HalfdofError
+from halfdof_ctrl.files import load_model, load_system, save_model, save_response, save_system
 from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.mounts import hydromount
+from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
+from halfdof_ctrl.report import write_report
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
 
@@ -19,14 +22,23 @@ __all__ = [
     "PencilStructure",
     "SecondOrderModel",
     "StateFeedback",
+    "bode_plot",
     "crosscheck",
     "descriptor_response",
     "exact_reduction",
     "frequency_response",
     "hydromount",
+    "load_model",
+    "load_system",
     "lqr",
     "mech2ss",
     "mechss",
     "pencil_structure",
+    "pole_map_plot",
+    "save_model",
+    "save_response",
+    "save_system",
+    "step_plot",
+    "write_report",
     "zeros",
 ]

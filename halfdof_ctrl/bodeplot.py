@@ -301,9 +301,9 @@ def _set_logarithmic(ax: Axes) -> None:
     curve = curve[np.isfinite(curve) & (curve > 0.0)]
     if curve.size == 0:
         return
-    ax.set_yscale("log")
     if curve.max() <= FLAT * curve.min():
         ax.set_ylim(curve.min() / ROOM, curve.max() * ROOM)
+    ax.set_yscale("log")
     usual = float(np.percentile(curve, USUAL))
     if ax.dataLim.y1 > SPIKE * usual:
         ax.set_ylim(top=np.sqrt(SPIKE) * usual)

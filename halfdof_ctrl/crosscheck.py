@@ -20,7 +20,7 @@ import scipy.optimize
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, require_regular
-from halfdof_ctrl.errors import MatrixError
+from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
@@ -109,6 +109,8 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     ------
     ComplexModelError, SingularPencilError
         The model has no real state space.
+    ParameterError
+        The system is discrete in time.
     MatrixError
         Another number of inputs or outputs.
 
@@ -133,12 +135,15 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
             f"{len(model.inputs)}. Compare it with the model it was made of."
         )
         raise MatrixError(msg, matrix="D")
+    if sys.isdtime(strict=True):
+        msg = f"The system is discrete in time (dt = {sys.dt}), the model is not. Check it before it is sampled."
+        raise ParameterError(msg, parameter="dt", value=sys.dt)
     require_regular(model)
     structure = pencil_structure(model)
     system = _Balanced.of(sys)
     transfer = _compare_transfer(model, system, sys, structure)
     pole_error, pole_worst = _compare_poles(system.A, structure.finite_eigenvalues)
-    step_error, step_worst, horizon = _compare_steps(model, sys, structure)
+    step_error, step_worst, horizon = _compare_steps(model, system, structure)
     return CrossCheck(
         order=sys.nstates,
         n_finite=structure.finite_eigenvalues.size,
@@ -178,7 +183,12 @@ class _Balanced:
         values, changes = [], []
         for s in points:
             shifted = s * unit - self.A
-            x, y = np.linalg.solve(shifted, self.B), np.linalg.solve(shifted.T, self.C.T)
+            try:
+                x, y = np.linalg.solve(shifted, self.B), np.linalg.solve(shifted.T, self.C.T)
+            except np.linalg.LinAlgError:  # a pole where the model has none
+                values.append(np.full(self.D.shape, np.inf))
+                changes.append(np.zeros(self.D.shape))
+                continue
             values.append(self.C @ x + self.D)
             changes.append(ROUNDING * np.abs(y).T @ size @ np.abs(x))
         return np.stack(values, axis=2), np.stack(changes, axis=2)
@@ -219,8 +229,9 @@ def _points(poles: ComplexArray) -> ComplexArray:
     chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
     low, high = np.abs(moving).min(), np.abs(moving).max()
     grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
-    lift = np.maximum(0.0, CLEARANCE * np.abs(chosen) - np.abs(chosen.real))
-    at_poles = lift + 1j * np.abs(chosen.imag)
+    swinging = chosen[chosen.imag > 0.0]
+    lift = np.maximum(0.0, CLEARANCE * np.abs(swinging) - np.abs(swinging.real))
+    at_poles = lift + 1j * swinging.imag
     at_sizes = 1j * np.abs(chosen)
     off_axis = np.concatenate([direction * np.array([low, np.sqrt(low * high), high]) for direction in OFF_AXIS])
     points = np.concatenate([1j * grid, at_poles, at_sizes, off_axis])
@@ -237,33 +248,37 @@ def _compare_poles(A: FloatArray, finite: ComplexArray) -> tuple[float, str]:
     poles, rounding = eigenvalues_and_rounding(A)
     rows, columns = scipy.optimize.linear_sum_assignment(np.abs(poles[:, None] - finite))
     difference = np.abs(poles[rows] - finite[columns])
-    allowed = np.abs(finite[columns]) + rounding[rows] / POLE_TOLERANCE
-    errors = np.where(difference > 0.0, difference / allowed, 0.0)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
+        allowed = np.abs(finite[columns]) + rounding[rows] / POLE_TOLERANCE
+        errors = np.where(difference > 0.0, difference / allowed, 0.0)
     worst = int(np.argmax(errors))
     return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"
 
 
-def _compare_steps(
-    model: SecondOrderModel, sys: control.StateSpace, structure: PencilStructure
-) -> tuple[float, str, float]:
+def _compare_steps(model: SecondOrderModel, system: _Balanced, structure: PencilStructure) -> tuple[float, str, float]:
     """Follow the response to a step of each input by both roads, segment by segment."""
+    if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
+        return 0.0, "not followed: a step has no derivative for Bv, Ba, Dv, Da", 0.0
     plan = step_plan(structure.finite_eigenvalues)
     exact = descriptor_step_response(model, plan)
     found = np.empty_like(exact)
-    times: list[FloatArray] = []
-    for j in range(sys.ninputs):
-        state, done, start = np.zeros(sys.nstates), 0, 0.0
+    drives, gauges = (
+        _powers_of_two(np.abs(part).max(axis=axis, initial=0.0)) for axis, part in enumerate((system.B, system.C))
+    )
+    unit = gauges[:, None] * drives
+    scaled = control.StateSpace(system.A, system.B * drives, gauges[:, None] * system.C, system.D * unit)
+    for j in range(scaled.ninputs):
+        state, done = np.zeros(scaled.nstates), 0
         for segment in plan:
             time = segment.h * np.arange(segment.steps + 1)
-            inputs = np.zeros((sys.ninputs, time.size))
+            inputs = np.zeros((scaled.ninputs, time.size))
             inputs[j] = 1.0
-            part = control.forced_response(sys, time, inputs, initial_state=state, return_states=True, squeeze=False)
-            found[:, j, done : done + segment.steps] = np.asarray(part.y).reshape(sys.noutputs, -1)[:, 1:]
-            state = np.asarray(part.x).reshape(sys.nstates, -1)[:, -1]
-            if j == 0:
-                times.append(np.asarray(start + time[1:]))
-            done, start = done + segment.steps, start + float(time[-1])
-    time = np.concatenate(times)
+            part = control.forced_response(scaled, time, inputs, initial_state=state, return_states=True, squeeze=False)
+            outputs = np.asarray(part.y).reshape(scaled.noutputs, time.size)[:, 1:]
+            found[:, j, done : done + segment.steps] = outputs / unit[:, j : j + 1]
+            state = np.asarray(part.x).reshape(scaled.nstates, time.size)[:, -1]
+            done += segment.steps
+    time = np.cumsum(np.concatenate([np.full(segment.steps, segment.h) for segment in plan]))
     errors = np.abs(found - exact) / _channel_size(np.abs(exact))
     i, j, k = _place_of_largest(errors)
     return float(errors[i, j, k]), f"{model.outputs[i]} from {model.inputs[j]} at t = {time[k]:.4g} s", float(time[-1])
@@ -274,6 +289,11 @@ def _channel_size(size: FloatArray) -> FloatArray:
     largest = size.max(axis=2, keepdims=True)
     overall = size.max(initial=0.0)
     return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
+
+
+def _powers_of_two(size: FloatArray) -> FloatArray:
+    """Powers of two that bring sizes near one, 1 for a zero."""
+    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
 
 
 def _place_of_largest(errors: FloatArray) -> tuple[int, int, int]:

@@ -38,8 +38,8 @@ def quadratic_transfer(
     batch = max(1, BATCH_ENTRIES // P[0].size)
     for start in range(0, points.size, batch):
         part = points[start : start + batch]
-        states = _solved(_polynomial(P, part), _polynomial(B, part))
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
+            states = _solved(_polynomial(P, part), _polynomial(B, part))
             response = _polynomial(F, part) @ states + _polynomial(D, part)
         response[~np.isfinite(states).all(axis=(1, 2))] = complex(np.inf, np.nan)
         values[:, :, start : start + batch] = np.moveaxis(response, 0, 2)
@@ -61,13 +61,12 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
     columns = _power_of_two_below(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
     scaled, right = P * rows * columns, B * rows
     solution = _solve_each(scaled, right)
-    with np.errstate(invalid="ignore", over="ignore"):
-        residual = right - scaled @ solution
-        size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
-        coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
-        if coarse.any():
-            solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
-        solution *= np.swapaxes(columns, 1, 2)
+    residual = right - scaled @ solution
+    size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
+    coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
+    if coarse.any():
+        solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
+    solution *= np.swapaxes(columns, 1, 2)
     return solution
 
 

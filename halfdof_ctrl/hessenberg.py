@@ -11,11 +11,15 @@ and (10) runs over the states with all points side by side, in blocks that are m
 
 What Q mixes is lost in deep roll-off, where the output is small against the state. There the response is
 corrected once by the adjoint solution y, (s I - A)^T y = c, on the residual in the original coordinates:
-c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y.
+c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where even that is no small
+correction (an output some 1e25 times smaller than the state, at the far end of a chain), a sparse LU
+factorization of s I - A itself keeps the structure and the digits.
 """
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 
@@ -23,6 +27,7 @@ BLOCK = 12  #: states whose substitution is done before the rest is updated by o
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
 UNREACHED = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
+UNSAFE = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
 ROLLED_OFF = 1e-4  #: outputs below this part of ``|c| |x|`` are corrected by the adjoint
 
 
@@ -77,23 +82,37 @@ def _add_channels(
             for i in np.flatnonzero(small.any(axis=1)).tolist():
                 if i not in adjoints:
                     adjoints[i] = ShiftedSolver(A.T, C[i])
-                response[i, small[i]] += _correction(A, B[:, j], part[small[i]], solver, x[:, small[i]], adjoints[i])
+                response[i, small[i]] = _refined(
+                    response[i, small[i]], (A, B[:, j], C[i]), part[small[i]], (solver, x[:, small[i]]), adjoints[i]
+                )
             values[:, j, start : start + batch] += response
 
 
-def _correction(
-    A: FloatArray,
-    b: FloatArray,
+def _refined(
+    response: ComplexArray,
+    system: tuple[FloatArray, FloatArray, FloatArray],
     points: ComplexArray,
-    solver: "ShiftedSolver",
-    x: ComplexArray,
+    solution: tuple["ShiftedSolver", ComplexArray],
     adjoint: "ShiftedSolver",
 ) -> ComplexArray:
-    """Give ``y^T (b - (s I - A) x)`` for solutions x in the solver's coordinates."""
+    """Add ``y^T (b - (s I - A) x)`` to the response ``c x``, or solve again where that is not small."""
+    (A, b, c), (solver, x) = system, solution
     state = _real_times_complex(solver.Q, x)
     residual = b[:, None] - points * state + _real_times_complex(A, state)
-    costate = _real_times_complex(adjoint.Q, adjoint.solve(points))
-    return np.asarray((costate * residual).sum(axis=0))
+    correction = (_real_times_complex(adjoint.Q, adjoint.solve(points)) * residual).sum(axis=0)
+    refined = np.asarray(response + correction)
+    for k in np.flatnonzero(np.abs(correction) > UNSAFE * np.abs(refined)).tolist():
+        refined[k] = _by_sparse_factors(A, b, c, complex(points[k]))
+    return refined
+
+
+def _by_sparse_factors(A: FloatArray, b: FloatArray, c: FloatArray, s: complex) -> complex:
+    """Give ``c (s I - A)^-1 b`` by one sparse factorization."""
+    shifted = csc_array(s * np.eye(A.shape[0]) - A)
+    try:
+        return complex(c @ splu(shifted).solve(b.astype(np.complex128)))
+    except RuntimeError:  # a pole
+        return complex(np.inf, np.nan)
 
 
 class ShiftedSolver:

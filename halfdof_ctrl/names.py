@@ -78,6 +78,9 @@ def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[st
         Wrong count, entries that are not text, or duplicates, which python-control would merge
         silently into one signal.
     """
+    if isinstance(given, set | frozenset):
+        msg = f"Names of {what} were given as a set, which has no order. Give a list."
+        raise SignalNameError(msg, names=())
     names = (given,) if isinstance(given, str) else tuple(given)
     if len(names) != count:
         msg = (

@@ -33,6 +33,7 @@ class PageFigure:
     title: str
     description: str  #: what it shows, for the caption and for readers who do not see it
     svg: bytes
+    columns: int  #: of axes; from two on it scrolls on a narrow screen instead of shrinking
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -127,9 +128,11 @@ def _word(*, good: bool) -> str:
 def _figure(figure: PageFigure) -> str:
     data = base64.b64encode(figure.svg).decode("ascii")
     text = html.escape(f"{figure.title}. {figure.description}")
+    look = ' class="broad"' if figure.columns > 1 else ""
     return (
-        f'<figure id="{figure.stem}">\n<img src="data:image/svg+xml;base64,{data}" alt="{text}">\n'
-        f"<figcaption>{text}</figcaption>\n</figure>"
+        f'<figure id="{figure.stem}"{look}>\n<div class="wide">'
+        f'<img src="data:image/svg+xml;base64,{data}" alt="{text}">'
+        f"</div>\n<figcaption>{text}</figcaption>\n</figure>"
     )
 
 
@@ -177,7 +180,7 @@ def _table(
     """Write a table that scrolls by itself where the screen is narrow; columns in `long` wrap their text."""
     first = "".join(f'<th scope="col">{html.escape(cell)}</th>' if cell else "<td></td>" for cell in head)
     body = "\n".join(f"<tr>{_cells(row, long)}</tr>" for row in rows)
-    look = ' class="numbers"' if numbers else ""
+    look = ' class="numbers"' if numbers else ' class="prose"' if long else ""
     return (
         f'<div class="wide" role="group" tabindex="0" aria-label="{html.escape(" ".join(head).strip())}">'
         f"<table{look}>\n<thead><tr>{first}</tr></thead>\n<tbody>\n{body}\n</tbody>\n</table></div>"

@@ -125,7 +125,8 @@ class _Deflated:
 
 def _deflated(pencil: _Pencil) -> _Deflated:
     """Reduce a pencil until its E has full row rank."""
-    steps, redundant, gap = [], 0, float("inf")
+    steps: list[int] = []
+    redundant, gap = 0, float("inf")
     while True:
         step = _deflated_once(pencil.equilibrated())
         pencil, gap = step.pencil, min(gap, step.gap)
@@ -187,7 +188,7 @@ def _irreducible_blocks(pencil: _Pencil) -> list[_Pencil] | None:
         return None
     count, labels = connected_components(csr_array(pattern[:, matched]), directed=True, connection="strong")
     members = [np.flatnonzero(labels == label) for label in range(count)]
-    return [pencil.part(rows, matched[rows]) for rows in members]
+    return [pencil.part(rows, matched[rows].astype(np.intp)) for rows in members]
 
 
 def _product(left: Matrix, matrix: Matrix, squares: FloatArray) -> tuple[Matrix, FloatArray]:

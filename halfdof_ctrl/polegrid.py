@@ -19,7 +19,7 @@ AT_ORIGIN = 1e-7  #: points below this part of the largest |s| do not decide on 
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
-SAME = 0.004  #: distance below which markers cover each other, as part of the axes
+SAME = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -82,16 +82,14 @@ def draw_pole_grid(ax: Axes) -> None:
 
 
 def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
-    """Write how many points lie on the same spot, where it is more than one."""
-    left, last = _axes_coordinates(ax, points), np.full(2, np.inf)
-    while left.shape[0]:
-        same = np.hypot(*(left - left[0]).T) < SAME
-        if np.count_nonzero(same) > 1 and np.hypot(*(left[0] - last)) > APART:
-            last = left[0]
+    """Write the multiplicity beside points that coincide up to rounding."""
+    left, near_origin = points, AT_ORIGIN * np.abs(points).max(initial=0.0)
+    while left.size:
+        same = np.abs(left - left[0]) <= SAME * np.abs(left[0]) + near_origin
+        if np.count_nonzero(same) > 1:
             ax.annotate(
                 f"{np.count_nonzero(same)}x",
-                tuple(left[same].mean(axis=0).tolist()),
-                xycoords=ax.transAxes,
+                (float(left[0].real), float(left[0].imag)),
                 xytext=(6, 6),
                 textcoords="offset points",
                 fontsize="small",

@@ -16,113 +16,25 @@ Derivation: docs/explanation/reduction.md.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange
 
 from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
-from halfdof_ctrl.errors import (
-    ComplexModelError,
-    InconsistentStateError,
-    MatrixError,
-    ParameterError,
-    SingularLeadingMatrixError,
-)
+from halfdof_ctrl.errors import ComplexModelError, InconsistentStateError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.leading import LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.partition import DofPartition, orthonormal_bases, select_columns
+from halfdof_ctrl.recovery import RecoveredMotion, TimeResponse, forward_slope, given_values, require_consistent
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import Signal, trimmed
 
 Road: TypeAlias = Literal["selection", "orthogonal"]
 
-PLAINLY_REGULAR = 1e-6  #: W with this reciprocal condition number is nonsingular in any units
-SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
-CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
-
-
-class TimeResponse(Protocol):
-    """What `ExactReduction.recover` reads of a `control.TimeResponseData`."""
-
-    t: FloatArray  #: (k,) times [s]
-    x: FloatArray  #: (N, k) or (N, traces, k) states
-    u: FloatArray  #: (m, k) or (m, traces, k) inputs
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RecoveredMotion:
-    """Histories of all n DOFs at k times, with an axis for the traces where the response has one."""
-
-    time: FloatArray  #: (k,) [s]
-    displacement: FloatArray  #: (n, k) or (n, traces, k) [m]
-    velocity: FloatArray  #: (n, k) or (n, traces, k) [m/s]
-    dofs: tuple[str, ...]  #: names of the n DOFs
-
-    def __getitem__(self, name: str) -> FloatArray:
-        """Give the history of ``<dof>`` or ``<dof>_dot``.
-
-        Raises
-        ------
-        SignalNameError
-            The name is neither.
-        """
-        for derivative, history in enumerate((self.displacement, self.velocity)):
-            names = motion_names(self.dofs, derivative)
-            if name in names:
-                return np.asarray(history[names.index(name)])
-        raise unknown_name_error(name, "motion", (*self.dofs, *motion_names(self.dofs, 1)))
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class LeadingMatrix:
-    """W of equation (2), factorized; equilibrated by powers of two where its condition asks for it."""
-
-    factors: FloatArray  #: (n, n) L and U
-    pivots: npt.NDArray[np.int32]
-    rows: FloatArray | None  #: (n,) powers of two, None where W was taken as it is
-    columns: FloatArray | None  #: (n,) likewise
-    equilibrated: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
-    rcond: float  #: reciprocal 1-norm condition number of the matrix that was factorized; 0 if exactly singular
-
-    @classmethod
-    def factorized(cls, W: FloatArray) -> "LeadingMatrix":
-        """Factorize and estimate the condition; equilibrate first where that might matter.
-
-        The equilibrated matrix is conditioned at least about as well (A. van der Sluis, 1969), so a W that is well
-        conditioned as it stands needs no second look.
-        """
-        factors, pivots, rcond = _lu_and_rcond(W)
-        if rcond >= PLAINLY_REGULAR:
-            return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
-        rows, columns = equilibrating_factors(W)
-        matrix = W * rows[:, None] * columns
-        factors, pivots, rcond = _lu_and_rcond(matrix)
-        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
-
-    @property
-    def is_singular(self) -> bool:
-        """Whether W is singular to working precision: rcond below n eps."""
-        return self.rcond < len(self.factors) * SINGULAR
-
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
-        if self.rows is None or self.columns is None or self.equilibrated is None:
-            return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
-        right = right * self.rows[:, None]
-        solution = dgetrs(self.factors, self.pivots, right)[0]
-        solution += dgetrs(self.factors, self.pivots, right - self.equilibrated @ solution)[0]
-        return np.asarray(solution * self.columns[:, None])
-
-
-def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
-    """Factorize and estimate the reciprocal 1-norm condition number, 0 where a pivot vanishes."""
-    norm = dlange("1", matrix)  # type: ignore[call-arg]  # the stubs lack its first argument
-    factors, pivots, exact_zero = dgetrf(matrix)
-    return factors, pivots, 0.0 if exact_zero else float(dgecon(factors, norm)[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -219,8 +131,8 @@ class ExactReduction:
             of the largest value of its kind.
         """
         model = self.model
-        q = _given_values(q0, model.dofs, "displacement")
-        v = _given_values({} if v0 is None else v0, model.dofs, "velocity")
+        q = given_values(q0, model.dofs, "displacement")
+        v = given_values({} if v0 is None else v0, model.dofs, "velocity")
         u = np.broadcast_to(np.asarray(u0, dtype=float), (len(model.inputs),))
         moving = self.partition.n_inertial + self.partition.n_half
         p = self.partition.to_coordinates(np.nan_to_num(q)[:, None])[:moving, 0]
@@ -231,7 +143,7 @@ class ExactReduction:
         for derivative, given in enumerate((q, v)):
             motion = self.motion(derivative)
             required = motion.X @ x + motion.direct(u.size) @ u
-            _require_consistent(motion_names(model.dofs, derivative), given, required)
+            require_consistent(motion_names(model.dofs, derivative), given, required)
         return x
 
     def recover(self, response: TimeResponse) -> RecoveredMotion:
@@ -250,7 +162,9 @@ class ExactReduction:
         -------
         RecoveredMotion
         """
-        x, u = np.asarray(response.x, dtype=float), np.asarray(response.u, dtype=float)
+        x = np.asarray(response.x, dtype=float)
+        free = np.zeros((len(self.model.inputs), *x.shape[1:]))
+        u = free if response.u is None else np.asarray(response.u, dtype=float)
         if x.shape[0] != self.order or u.shape[0] != len(self.model.inputs):
             msg = (
                 f"The response has {x.shape[0]} states and {u.shape[0]} inputs, the reduced model {self.order} and "
@@ -265,7 +179,7 @@ class ExactReduction:
             history = np.tensordot(motion.X, x, axes=1)
             for power, part in enumerate(motion.U):
                 if power == len(slopes):
-                    slopes.append(_forward_slope(slopes[-1], time))
+                    slopes.append(forward_slope(slopes[-1], time))
                 history += np.tensordot(part, slopes[power], axes=1)
             histories.append(history)
         return RecoveredMotion(time=time, displacement=histories[0], velocity=histories[1], dofs=self.model.dofs)
@@ -308,6 +222,8 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     ------
     ComplexModelError
         The model has structural damping or other imaginary parts.
+    ParameterError
+        `tol` or `method` is none of what they can be.
     SingularLeadingMatrixError
         W of equation (2) is singular to working precision (rcond below n eps after equilibration): a
         constraint, an algebraic loop through dampers, or a motion that nothing resists.
@@ -370,6 +286,9 @@ def _partitioned(model: SecondOrderModel, tol: float | None, method: Road | None
     if method not in (None, "selection", "orthogonal"):
         msg = f"method must be 'selection', 'orthogonal' or None, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
+    if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):
+        msg = f"tol = {tol!r}, but it is a relative size: a number from 0 to below 1, such as 1e-12."
+        raise ParameterError(msg, parameter="tol", value=tol)
     if method != "orthogonal":
         partition = select_columns(model, tol)
         W = _leading_columns(model, partition)
@@ -438,46 +357,3 @@ def _singular_error(
         "spring that the model left out, or eliminate the constraint."
     )
     return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)
-
-
-def _given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ...], what: str) -> FloatArray:
-    """Read displacements or velocities as an array with NaN where they are open."""
-    if isinstance(given, Mapping):
-        values = np.full(len(dofs), np.nan)
-        for name, value in given.items():
-            if name not in dofs:
-                raise unknown_name_error(name, "DOF", dofs)
-            values[dofs.index(name)] = value
-        return values
-    values = np.asarray(given, dtype=float)
-    if values.shape != (len(dofs),):
-        msg = f"{what} must have one value for each of the {len(dofs)} DOFs, but its shape is {values.shape}."
-        raise MatrixError(msg, matrix=what)
-    return values
-
-
-def _require_consistent(names: tuple[str, ...], given: FloatArray, required: FloatArray) -> None:
-    stated = ~np.isnan(given)
-    scale = max(np.abs(given[stated]).max(initial=0.0), np.abs(required[stated]).max(initial=0.0))
-    wrong = np.flatnonzero(stated & (np.abs(np.nan_to_num(given) - required) > CONSISTENT * scale)).tolist()
-    if not wrong:
-        return
-    text = ", ".join(f"{names[i]} = {given[i]:.6g} (must be {required[i]:.6g})" for i in wrong)
-    msg = (
-        f"The initial values contradict the equations of the DOFs without inertia: {text}. "
-        "Such a value follows from the others and from the inputs; leave it out, or give u0."
-    )
-    raise InconsistentStateError(
-        msg,
-        names=tuple([names[i] for i in wrong]),
-        given=tuple(given[wrong].tolist()),
-        required=tuple(required[wrong].tolist()),
-    )
-
-
-def _forward_slope(values: FloatArray, time: FloatArray) -> FloatArray:
-    """Slope of a piecewise linear history after each time (before it, at the last)."""
-    if time.size < 2:  # noqa: PLR2004
-        return np.zeros_like(values)
-    slope = np.diff(values, axis=-1) / np.diff(time)
-    return np.concatenate([slope, slope[..., -1:]], axis=-1)

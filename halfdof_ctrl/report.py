@@ -281,7 +281,8 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
         made.plot.figure.set_layout_engine("none")  # it stays as it is, which takes half the time
         save_figure(made.plot, folder / f"{made.stem}.png")
         svg = (folder / f"{made.stem}.svg").read_bytes()
-        figures.append(PageFigure(made.stem, made.title, made.description, svg))
+        columns = made.plot.axes.shape[1]
+        figures.append(PageFigure(made.stem, made.title, made.description, svg, columns))
     for ending in (".npz", ".mat"):
         save_system(findings.sys, folder / f"statespace{ending}")
     (folder / "crosscheck.json").write_bytes(check_as_json(findings.check))

@@ -4,6 +4,8 @@ Both give `control.FrequencyResponseData`, so that python-control's plots and to
 are always the points themselves: two of them are two points, not the limits of a range.
 """
 
+from collections.abc import Sequence
+
 import control
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +15,7 @@ from halfdof_ctrl.descriptor import pencil_structure, require_regular
 from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, SingularLeadingMatrixError
 from halfdof_ctrl.hessenberg import state_space_response
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import control_label
+from halfdof_ctrl.names import control_label, control_labels
 from halfdof_ctrl.statespace import mech2ss
 
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
@@ -56,7 +58,8 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
         omega = default_frequencies(pencil_structure(model).finite_eigenvalues)
     frequencies = checked_frequencies(omega)
     values = model(1j * frequencies, squeeze=False)
-    return _data(values, frequencies, model.inputs, model.outputs, model.name)
+    name = None if model.name is None else control_label(model.name)
+    return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
 
 
 def frequency_response(
@@ -100,7 +103,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
     else:
         sys = sysdata
-    frequencies = checked_frequencies(default_frequencies(sys.poles()) if omega is None else omega)
+    frequencies = checked_frequencies(_system_frequencies(sys) if omega is None else omega)
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
@@ -127,6 +130,16 @@ def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> Fl
     return np.unique(np.concatenate([np.geomspace(low, high, points), near]))
 
 
+def _system_frequencies(sys: control.StateSpace) -> FloatArray:
+    """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency."""
+    poles = np.asarray(sys.poles(), dtype=np.complex128)
+    if not sys.isdtime(strict=True):
+        return default_frequencies(poles)
+    dt = float(sys.dt)
+    frequencies = default_frequencies(np.log(poles[poles != 0.0]) / dt)
+    return np.append(frequencies[frequencies < np.pi / dt], np.pi / dt)
+
+
 def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
     """Read frequencies as a 1D array of finite numbers that are not negative [rad/s]."""
     try:
@@ -143,19 +156,13 @@ def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
 def _data(
     values: ComplexArray,
     frequencies: FloatArray,
-    inputs: tuple[str, ...] | list[str],
-    outputs: tuple[str, ...] | list[str],
+    inputs: Sequence[str],
+    outputs: Sequence[str],
     name: str | None,
     *,
     dt: float | bool | None = 0,
 ) -> control.FrequencyResponseData:
-    labels = {} if name is None else {"name": control_label(name), "sysname": control_label(name)}
+    labels = {} if name is None else {"name": name, "sysname": name}
     return control.FrequencyResponseData(
-        values,
-        frequencies,
-        dt,
-        inputs=[control_label(signal) for signal in inputs],
-        outputs=[control_label(signal) for signal in outputs],
-        plot_type="bode",
-        **labels,
+        values, frequencies, dt, inputs=list(inputs), outputs=list(outputs), plot_type="bode", **labels
     )

@@ -200,6 +200,12 @@ def test_cost_without_motion_is_refused() -> None:
         lqr(mount(), effort={"F_y": 1.0})
 
 
+def test_model_without_states_is_refused() -> None:
+    """Springs alone leave nothing to regulate."""
+    with pytest.raises(WeightError, match="has no states"):
+        lqr(mechss(None, None, [[1]], dofs="y"), displacement={"y": 1.0}, effort={"F_y": 1.0})
+
+
 def test_weight_on_a_derivative_of_an_input_is_refused() -> None:
     """The velocity of a static DOF under a force of its own has no finite square."""
     with pytest.raises(WeightError, match="s_dot follows the derivative of an input"):

@@ -211,6 +211,14 @@ def test_continuous_phase_takes_no_jump_above_half_a_turn(steps: list[float]) ->
     assert_allclose(turns, np.round(turns), atol=1e-9)
 
 
+def test_constant_magnitude_is_drawn_without_a_warning() -> None:
+    """Values that differ in the last bit alone get limits of their own."""
+    cplt = bode_plot(mechss(None, None, [[0, 3, 1], [0, -3, 4], [2, 3, 0]]))
+    cplt.figure.canvas.draw()
+    low, high = cplt.axes[0, 0].get_ylim()
+    assert high / low > 10.0
+
+
 def test_undamped_resonance_does_not_flatten_the_rest() -> None:
     """An infinite peak leaves the axes, whose range is that of the curve around it."""
     ax = bode_plot(mechss([[1]], None, [[1]])).axes[0, 0]
@@ -354,6 +362,12 @@ def test_rounded_poles_of_a_free_body_count_as_integrators() -> None:
     assert_allclose(step_times(poles)[-1], 20 * 2 * np.pi / np.sqrt(7.0 * 4.0 / 3.0), rtol=1e-9)
 
 
+def test_rounding_in_the_equations_of_a_free_body_does_not_make_it_a_vibration() -> None:
+    """A rigid body motion whose stiffness is 2e-17 instead of zero has no period of 1e9 s."""
+    time, _ = curve_of(step_plot(mechss([[1, -2], [-2, 4]], [[1, -1], [-1, 1]], [[1, -1], [-1, 1]])).lines[0, 0])
+    assert_allclose(time[-1], 5.0, rtol=1e-9)
+
+
 @given(
     st.lists(
         st.complex_numbers(min_magnitude=1e-6, max_magnitude=1e6, allow_nan=False, allow_infinity=False), max_size=6
@@ -433,6 +447,13 @@ def test_poles_far_apart_get_logarithmic_axes() -> None:
     assert (wide.get_xscale(), near.get_xscale()) == ("symlog", "linear")
     assert wide.get_xlim()[0] < -1e5
     assert near.get_ylim()[1] > 17.8
+
+
+def test_rounded_poles_of_a_free_body_do_not_stretch_the_map() -> None:
+    """A rigid body motion rounded off the origin beside a vibration leaves the axes linear."""
+    cplt = pole_map_plot(mechss(np.diag([6, 7]), None, [[1, -1], [-1, 1]]))
+    cplt.figure.canvas.draw()
+    assert cplt.axes[0, 0].get_xscale() == "linear"
 
 
 def test_coincident_poles_are_counted() -> None:

@@ -18,9 +18,10 @@ from sphinx.writers.html5 import HTML5Translator
 TAG = re.compile(r"\\tag\{([^}]*)\}")
 SIZE = 17.5  #: of the font in pixels, where the text's is 16
 TEXT_SIZE = 16.0
+WORD_JOINER = "\N{WORD JOINER}"  # keeps a comma on the line of the formula before it
 OPENING = re.compile(r'<svg (?:xmlns[^ ]*="[^"]*" )+width="([\d.]+)" height="([\d.]+)"')
 
-ziamath.config.svg2 = False  # no shared symbols, whose identifiers would stand in the page many times
+SYMBOL = re.compile(r'<symbol id="([^"]*)".*?</symbol>', re.DOTALL)
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -31,7 +32,7 @@ def setup(app: Sphinx) -> dict[str, Any]:
 
 def visit_inline(translator: HTML5Translator, node: nodes.math) -> None:
     """Write a formula in a line of text."""
-    translator.body.append(_svg(node, node.astext(), block=False))
+    translator.body.append(_svg(translator, node, node.astext(), block=False) + WORD_JOINER)
     raise nodes.SkipNode
 
 
@@ -42,13 +43,13 @@ def visit_block(translator: HTML5Translator, node: nodes.math_block) -> None:
     if len(tags) > 1:
         msg = f"A displayed formula has one number at most, not {tags}: {text}"
         raise ExtensionError(msg)
-    formula = _svg(node, TAG.sub("", text), block=True)
+    formula = _svg(translator, node, TAG.sub("", text), block=True)
     anchor, number = (f' id="eq-{tags[0]}"', f'<span class="eqno">({tags[0]})</span>') if tags else ("", "")
     translator.body.append(f'<div class="math"{anchor}><div class="formula">{formula}</div>{number}</div>\n')
     raise nodes.SkipNode
 
 
-def _svg(node: nodes.Element, text: str, *, block: bool) -> str:
+def _svg(translator: HTML5Translator, node: nodes.Element, text: str, *, block: bool) -> str:
     """Draw a formula in the colour of the text, its sizes in units of the text's font."""
     text = " ".join(text.split())
     try:
@@ -62,6 +63,25 @@ def _svg(node: nodes.Element, text: str, *, block: bool) -> str:
         msg = f"Unexpected beginning of a drawing: {svg[:80]}"
         raise ExtensionError(msg)
     width, height = (float(size) / TEXT_SIZE for size in found.groups())
-    place = f"width:{width:.3f}em;height:{height:.3f}em" + ("" if block else f";vertical-align:{descent / TEXT_SIZE:.3f}em")
+    place = f"width:{width:.3f}em;height:{height:.3f}em" + (
+        "" if block else f";vertical-align:{descent / TEXT_SIZE:.3f}em"
+    )
     label = html.escape(text, quote=True)
-    return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" style="{place}"{svg[found.end() :]}'
+    drawing = _with_new_symbols(svg[found.end() :], translator.__dict__.setdefault("drawn_symbols", {}))
+    return f'<svg xmlns="http://www.w3.org/2000/svg" role="img" aria-label="{label}" style="{place}"{drawing}'
+
+
+def _with_new_symbols(drawing: str, drawn: dict[str, str]) -> str:
+    """Leave out shapes that the page has already, since an identifier must not stand twice in it."""
+
+    def kept(symbol: re.Match[str]) -> str:
+        name, shape = symbol[1], symbol[0]
+        if name not in drawn:
+            drawn[name] = shape
+            return shape
+        if drawn[name] != shape:
+            msg = f"Two shapes are called {name}."
+            raise ExtensionError(msg)
+        return ""
+
+    return SYMBOL.sub(kept, drawing)
