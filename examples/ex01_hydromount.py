@@ -12,7 +12,6 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import halfdof_ctrl as hd
-from halfdof_ctrl.plots import bode_plot, pole_map_plot
 
 
 def mount() -> hd.SecondOrderModel:
@@ -41,8 +40,8 @@ def draw() -> control.ControlPlot:
         height_ratios=[1.4, 1.0],
         layout="constrained",
     )
-    bode_plot(mount(), Hz=True, ax=np.array([axes["magnitude"], axes["phase"]]))
-    plot = pole_map_plot(mount(), ax=axes["map"])
+    hd.bode_plot(mount(), Hz=True, ax=np.array([axes["magnitude"], axes["phase"]]))
+    plot = hd.pole_map_plot(mount(), ax=axes["map"])
     axes["magnitude"].tick_params(labelbottom=False)
     figure.align_ylabels([axes["magnitude"], axes["phase"]])
     return plot

@@ -63,6 +63,7 @@ def given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ..
 
 
 def require_consistent(names: tuple[str, ...], given: FloatArray, required: FloatArray) -> None:
+    """Refuse given values that differ from the required ones, NaN standing for what was left open."""
     stated = ~np.isnan(given)
     scale = max(np.abs(given[stated]).max(initial=0.0), np.abs(required[stated]).max(initial=0.0))
     wrong = np.flatnonzero(stated & (np.abs(np.nan_to_num(given) - required) > CONSISTENT * scale)).tolist()

@@ -135,15 +135,22 @@ def test_delicate_systems_raise_no_false_alarm(case: str) -> None:
     assert check.passed, check
 
 
-@pytest.mark.parametrize("case", ["double pole", "undamped", "stiff", "rigid damped", "no states", "integrator"])
-@pytest.mark.parametrize("letter", "ABCD")
+BREAKABLE = {
+    "double pole": "ABC",
+    "undamped": "ABC",
+    "stiff": "ABC",
+    "rigid damped": "ABC",
+    "no states": "D",
+    "integrator": "BC",
+}
+
+
+@pytest.mark.parametrize(("case", "letter"), [(case, letter) for case in BREAKABLE for letter in BREAKABLE[case]])
 def test_delicate_systems_are_not_let_off(case: str, letter: str) -> None:
     """The allowance for rounding does not hide an error of 1e-5 in the largest entry."""
     model = DELICATE[case]()
     sys = mech2ss(model)
     matrices = {name: np.array(getattr(sys, name)) for name in "ABCD"}
-    if not matrices[letter].any():
-        pytest.skip(f"{letter} has no entry to break")
     place = np.unravel_index(np.argmax(np.abs(matrices[letter])), matrices[letter].shape)
     matrices[letter][place] *= 1.0 + 1e-5
     check = crosscheck(model, control.StateSpace(*matrices.values()))

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import hydromount, mech2ss
 from halfdof_ctrl.errors import ParameterError
 
-ROUNDOFF = 1e-10  # a 3 x 3 solve with parameters over six decades
+ROUNDOFF = 1e-8  # parameters over six decades cancel in dcgain, which does not know that they are springs
 POSITIVE = st.floats(1e-1, 1e5)
 
 

@@ -14,7 +14,7 @@ from halfdof_ctrl import exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.errors import NearlyMasslessWarning
 from halfdof_ctrl.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns
 
-ORTHOGONAL = 1e-13  # products of orthonormal vectors with small integer matrices, n <= 12
+ORTHOGONAL = 1e-12  # products of orthonormal vectors with small integer matrices, n <= 12
 THERE_AND_BACK = 1e-10  # T of up to 12 mixed columns, scaled by powers of two, has a condition of up to 1e5
 ROUNDOFF = 1e-12  # small well-conditioned matrices
 
