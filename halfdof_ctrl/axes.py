@@ -4,7 +4,7 @@ A signal's unit follows from the model: a DOF's displacement is in m, its deriva
 force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import control
@@ -20,7 +20,7 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import force_names, motion_names, name_from_label, unknown_name_error
 
 AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
-AxesLike: TypeAlias = Axes | npt.ArrayLike | None
+AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
 Units: TypeAlias = Mapping[str, str] | None
 
 FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
@@ -56,17 +56,11 @@ def prepared_axes(
     """
     rows, columns = shape
     if ax is None:
+        # the figure comes first: what the first one switches on in a notebook, rc_context would switch off again
+        figure = plt.figure(figsize=(max(FIGURE_WIDTH, 3.0 * columns), height), layout="constrained")
+        heights = None if ratios is None else list(ratios)
         with plt.rc_context(control.config.defaults["ctrlplot.rcParams"] if columns > 1 else {}):
-            _, axes = plt.subplots(
-                rows,
-                columns,
-                squeeze=False,
-                sharex="col",
-                figsize=(max(FIGURE_WIDTH, 3.0 * columns), height),
-                height_ratios=None if ratios is None else list(ratios),
-                layout="constrained",
-            )
-        return axes
+            return figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=heights)
     given = np.asarray(ax, dtype=object)
     if not all(isinstance(entry, Axes) for entry in given.flat):
         msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."

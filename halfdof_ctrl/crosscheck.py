@@ -19,7 +19,7 @@ import scipy.linalg
 import scipy.optimize
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, require_regular
+from halfdof_ctrl.descriptor import pencil_structure, require_regular, typical_frequency
 from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
@@ -29,6 +29,9 @@ from halfdof_ctrl.spectrum import ROUNDING, eigenvalues_and_rounding
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
+SMALL = 1e-6  #: of the largest: eigenvalues below may stand for one at the origin
+ROUNDING_OF_ZERO = 64 * np.finfo(float).eps  #: of the size of output and input, left of a channel that is zero
+AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
 MOST_POLE_POINTS = 100  #: poles that get a point of their own
@@ -141,12 +144,15 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     require_regular(model)
     structure = pencil_structure(model)
     system = _Balanced.of(sys)
-    transfer = _compare_transfer(model, system, sys, structure)
-    pole_error, pole_worst = _compare_poles(system.A, structure.finite_eigenvalues)
-    step_error, step_worst, horizon = _compare_steps(model, system, structure)
+    finite = structure.finite_eigenvalues
+    gamma = typical_frequency(model)
+    moving = _moving(finite, system.A, gamma)
+    transfer = _compare_transfer(model, system, sys, moving)
+    pole_error, pole_worst = _compare_poles(system.A, finite, gamma)
+    step_error, step_worst, horizon = _compare_steps(model, system, moving)
     return CrossCheck(
         order=sys.nstates,
-        n_finite=structure.finite_eigenvalues.size,
+        n_finite=finite.size,
         n_infinite=structure.n_infinite,
         max_transfer_error=transfer.error,
         transfer_worst=transfer.worst,
@@ -190,7 +196,7 @@ class _Balanced:
                 changes.append(np.zeros(self.D.shape))
                 continue
             values.append(self.C @ x + self.D)
-            changes.append(ROUNDING * np.abs(y).T @ size @ np.abs(x))
+            changes.append(ROUNDING * (np.abs(y).T @ size + np.abs(self.C)) @ np.abs(x))
         return np.stack(values, axis=2), np.stack(changes, axis=2)
 
 
@@ -203,29 +209,42 @@ class _TransferErrors:
 
 
 def _compare_transfer(
-    model: SecondOrderModel, system: _Balanced, sys: control.StateSpace, structure: PencilStructure
+    model: SecondOrderModel, system: _Balanced, sys: control.StateSpace, moving: ComplexArray
 ) -> _TransferErrors:
-    points = _points(structure.finite_eigenvalues)
+    points = _points(moving)
     exact = model(points, squeeze=False)
     found, rounding = system(points)
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
-    errors = difference / (largest + rounding / TRANSFER_TOLERANCE)
+    errors = difference / (largest + (rounding + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
     worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {_in_words(points[k])}"
     with np.errstate(divide="ignore", invalid="ignore"):
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
     evaluated = np.asarray(sys(points, squeeze=False, warn_infinite=False))
-    evaluation = float((np.abs(evaluated - found) / largest).max())
+    with np.errstate(invalid="ignore"):
+        loss = np.abs(evaluated - found) / (largest + _rounding_of_zeros(largest) / TRANSFER_TOLERANCE)
+    evaluation = float(np.nan_to_num(loss, nan=np.inf).max())
     return _TransferErrors(float(errors[i, j, k]), worst, float(pointwise.max()), evaluation)
 
 
-def _points(poles: ComplexArray) -> ComplexArray:
+def _moving(finite: ComplexArray, A: FloatArray, gamma: float) -> ComplexArray:
+    """Leave out eigenvalues at the origin, which QZ finds at the square root of rounding where they are double.
+
+    One counts as at the origin if it is small and its nearest pole of the state space is zero to what A tells.
+    Where none is left, the model's typical frequency stands for the time scale.
+    """
+    poles, rounding = eigenvalues_and_rounding(A)
+    away = finite[np.abs(finite) > AT_ORIGIN * gamma]
+    if poles.size and away.size:
+        nearest = np.abs(away[:, None] - poles).argmin(axis=1)
+        small = np.abs(away) <= SMALL * np.abs(away).max()
+        away = away[~(small & (np.abs(poles) <= rounding)[nearest])]
+    return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
+
+
+def _points(moving: ComplexArray) -> ComplexArray:
     """Choose points on the imaginary axis around and at the poles, and off the axis."""
-    size = np.abs(poles)
-    moving = poles[size > 1e-9 * size.max(initial=0.0)]
-    if moving.size == 0:
-        moving = np.array([1.0 + 0.0j])
     chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
     low, high = np.abs(moving).min(), np.abs(moving).max()
     grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
@@ -239,8 +258,11 @@ def _points(poles: ComplexArray) -> ComplexArray:
     return np.where(near, points + CLEARANCE * np.abs(points), points)
 
 
-def _compare_poles(A: FloatArray, finite: ComplexArray) -> tuple[float, str]:
-    """Match the poles one to one and find the worst of them."""
+def _compare_poles(A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[float, str]:
+    """Match the poles one to one and find the worst of them.
+
+    Where the descriptor form has several eigenvalues at the origin, rounding in A splits them by its square root.
+    """
     if A.shape[0] != finite.size:
         return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
     if finite.size == 0:
@@ -249,17 +271,20 @@ def _compare_poles(A: FloatArray, finite: ComplexArray) -> tuple[float, str]:
     rows, columns = scipy.optimize.linear_sum_assignment(np.abs(poles[:, None] - finite))
     difference = np.abs(poles[rows] - finite[columns])
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        allowed = np.abs(finite[columns]) + rounding[rows] / POLE_TOLERANCE
+        allowed = np.abs(finite[columns]) + (rounding[rows] + ROUNDING * gamma) / POLE_TOLERANCE
+        origin = np.abs(finite[columns]) <= AT_ORIGIN * gamma
+        if np.count_nonzero(origin) > 1:
+            allowed[origin] += np.sqrt(ROUNDING) * np.linalg.norm(A, 2) / POLE_TOLERANCE
         errors = np.where(difference > 0.0, difference / allowed, 0.0)
     worst = int(np.argmax(errors))
     return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"
 
 
-def _compare_steps(model: SecondOrderModel, system: _Balanced, structure: PencilStructure) -> tuple[float, str, float]:
+def _compare_steps(model: SecondOrderModel, system: _Balanced, moving: ComplexArray) -> tuple[float, str, float]:
     """Follow the response to a step of each input by both roads, segment by segment."""
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         return 0.0, "not followed: a step has no derivative for Bv, Ba, Dv, Da", 0.0
-    plan = step_plan(structure.finite_eigenvalues)
+    plan = step_plan(moving)
     exact = descriptor_step_response(model, plan)
     found = np.empty_like(exact)
     drives, gauges = (
@@ -279,7 +304,8 @@ def _compare_steps(model: SecondOrderModel, system: _Balanced, structure: Pencil
             state = np.asarray(part.x).reshape(scaled.nstates, time.size)[:, -1]
             done += segment.steps
     time = np.cumsum(np.concatenate([np.full(segment.steps, segment.h) for segment in plan]))
-    errors = np.abs(found - exact) / _channel_size(np.abs(exact))
+    largest = _channel_size(np.abs(exact))
+    errors = np.abs(found - exact) / (largest + _rounding_of_zeros(largest) / STEP_TOLERANCE)
     i, j, k = _place_of_largest(errors)
     return float(errors[i, j, k]), f"{model.outputs[i]} from {model.inputs[j]} at t = {time[k]:.4g} s", float(time[-1])
 
@@ -289,6 +315,14 @@ def _channel_size(size: FloatArray) -> FloatArray:
     largest = size.max(axis=2, keepdims=True)
     overall = size.max(initial=0.0)
     return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
+
+
+def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
+    """Give what rounding leaves of a channel that is zero, by the sizes of its output and its input (p, m, 1)."""
+    by_output = largest.max(axis=1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        by_input = (largest / by_output).max(axis=0, keepdims=True)
+    return np.asarray(ROUNDING_OF_ZERO * by_output * by_input)
 
 
 def _powers_of_two(size: FloatArray) -> FloatArray:

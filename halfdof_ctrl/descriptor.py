@@ -123,7 +123,7 @@ def require_regular(model: SecondOrderModel) -> None:
     SingularPencilError
         ``P(s)`` is singular to working precision at three generic points.
     """
-    gamma = _time_scale((model.K, model.C, model.M))
+    gamma = typical_frequency(model)
     for point in GENERIC_POINTS:
         s = gamma * point
         P = model.K + s * model.C + s**2 * model.M
@@ -168,6 +168,11 @@ def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
     L[rows] = np.where(np.abs(left[:, :rank]) <= speck, 0.0, left[:, :rank]) * values[:rank] / down[:, None]
     R[:, columns] = np.where(np.abs(right[:rank]) <= speck, 0.0, right[:rank]) / across
     return L, R
+
+
+def typical_frequency(model: SecondOrderModel) -> float:
+    """Give a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
+    return _time_scale((model.K, model.C, model.M))
 
 
 def _time_scale(coefficients: Sequence[Matrix]) -> float:

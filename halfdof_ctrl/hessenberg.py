@@ -9,11 +9,15 @@ and row 1 its length (M. A. Hyman, 1957). Substitution in a triangular matrix ma
 stable (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 14.6.1), defective A or not,
 and (10) runs over the states with all points side by side, in blocks that are matrix products.
 
-What Q mixes is lost in deep roll-off, where the output is small against the state. There the response is
-corrected once by the adjoint solution y, (s I - A)^T y = c, on the residual in the original coordinates:
-c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where even that is no small
-correction (an output some 1e25 times smaller than the state, at the far end of a chain), a sparse LU
-factorization of s I - A itself keeps the structure and the digits.
+What Q mixes is lost where the output is small against the state, as in roll-off or far below the fastest pole. To
+first order the relative error of a response H = c x is below
+
+    eps |A| |x| |y| / |H|,    (s I - A)^T y = c,    |y| about |x| |c| / |b|,
+
+the last by reciprocity. Where that is much, H is corrected once by the adjoint solution y on the residual in the
+original coordinates, c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where even
+that is no small correction (an output some 1e25 times smaller than the state, at the far end of a chain), a
+sparse LU factorization of s I - A itself keeps the structure and the digits.
 """
 
 import numpy as np
@@ -27,8 +31,9 @@ BLOCK = 12  #: states whose substitution is done before the rest is updated by o
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
 UNREACHED = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
+EPS = float(np.finfo(float).eps)
 UNSAFE = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
-ROLLED_OFF = 1e-4  #: outputs below this part of ``|c| |x|`` are corrected by the adjoint
+RISK = 1e-9  #: bound of the relative error above which a response is corrected; it exceeds the error by far
 
 
 def state_space_response(
@@ -69,7 +74,7 @@ def _add_channels(
 ) -> None:
     """Add ``C (s I - A)^-1 B`` to values (p, m, k), an input at a time."""
     adjoints: dict[int, ShiftedSolver] = {}
-    lengths = np.linalg.norm(C, axis=1)
+    lengths, size = np.linalg.norm(C, axis=1), float(np.linalg.norm(A, 1))
     for j in range(B.shape[1]):
         solver = ShiftedSolver(A, B[:, j])
         rotated = C @ solver.Q
@@ -78,7 +83,8 @@ def _add_channels(
             x = solver.solve(part)
             with np.errstate(invalid="ignore", over="ignore"):
                 response = _real_times_complex(rotated, x)
-                small = np.abs(response) < ROLLED_OFF * lengths[:, None] * _column_norms(x)
+                bound = EPS * size * _column_norms(x) ** 2 * lengths[:, None] / abs(solver.beta)
+                small = bound > RISK * np.abs(response)
             for i in np.flatnonzero(small.any(axis=1)).tolist():
                 if i not in adjoints:
                     adjoints[i] = ShiftedSolver(A.T, C[i])
@@ -101,18 +107,25 @@ def _refined(
     residual = b[:, None] - points * state + _real_times_complex(A, state)
     correction = (_real_times_complex(adjoint.Q, adjoint.solve(points)) * residual).sum(axis=0)
     refined = np.asarray(response + correction)
-    for k in np.flatnonzero(np.abs(correction) > UNSAFE * np.abs(refined)).tolist():
-        refined[k] = _by_sparse_factors(A, b, c, complex(points[k]))
+    unsafe = np.abs(correction) > UNSAFE * np.abs(refined)
+    if unsafe.any():
+        refined[unsafe] = _by_sparse_factors(A, b, c, points[unsafe])
     return refined
 
 
-def _by_sparse_factors(A: FloatArray, b: FloatArray, c: FloatArray, s: complex) -> complex:
-    """Give ``c (s I - A)^-1 b`` by one sparse factorization."""
-    shifted = csc_array(s * np.eye(A.shape[0]) - A)
-    try:
-        return complex(c @ splu(shifted).solve(b.astype(np.complex128)))
-    except RuntimeError:  # a pole
-        return complex(np.inf, np.nan)
+def _by_sparse_factors(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray) -> ComplexArray:
+    """Give ``c (s I - A)^-1 b`` by a sparse factorization at each point."""
+    present = csc_array((A != 0.0) | np.eye(A.shape[0], dtype=bool))
+    columns = np.repeat(np.arange(A.shape[0]), np.diff(present.indptr))
+    entries, diagonal = -A[present.indices, columns].astype(np.complex128), present.indices == columns
+    values = np.empty(points.size, dtype=np.complex128)
+    for k, s in enumerate(points):
+        shifted = csc_array((entries + s * diagonal, present.indices, present.indptr), shape=A.shape)
+        try:
+            values[k] = c @ splu(shifted).solve(b.astype(np.complex128))
+        except RuntimeError:  # a pole
+            values[k] = complex(np.inf, np.nan)
+    return values
 
 
 class ShiftedSolver:

@@ -260,7 +260,9 @@ def _null_split(
         if rank == block.size:
             ranging.append(columns[:, block])
         else:
-            mixed = columns[:, block] @ (factors[:, None] * right.T)
+            speck = 4 * max(part.shape) * np.finfo(float).eps * values[0] / values[rank - 1]
+            clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
+            mixed = columns[:, block] @ (factors[:, None] * clean)
             ranging.append(mixed[:, :rank])
             null.append(mixed[:, rank:])
             size = np.abs(mixed).max(axis=1, keepdims=True) * (values[0] / values[rank - 1])

@@ -16,10 +16,12 @@ from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError
 from halfdof_ctrl.hessenberg import state_space_response
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import control_label, control_labels
+from halfdof_ctrl.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.statespace import mech2ss
 
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
 MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
+AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
 FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
 
 
@@ -119,7 +121,7 @@ def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> Fl
     damped pole the frequencies that its peak needs.
     """
     size = np.abs(poles)
-    moving = poles[size > 1e-9 * size.max(initial=0.0)]
+    moving = poles[size > AT_ORIGIN * size.max(initial=0.0)]
     if moving.size == 0:
         return np.geomspace(*FALLBACK_RANGE, points)
     low, high = np.abs(moving).min() / MARGIN, np.abs(moving).max() * MARGIN
@@ -132,9 +134,9 @@ def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> Fl
 
 def _system_frequencies(sys: control.StateSpace) -> FloatArray:
     """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency."""
-    poles = np.asarray(sys.poles(), dtype=np.complex128)
+    poles, rounding = eigenvalues_and_rounding(np.asarray(sys.A, dtype=float))
     if not sys.isdtime(strict=True):
-        return default_frequencies(poles)
+        return default_frequencies(poles[np.abs(poles) > rounding])
     dt = float(sys.dt)
     frequencies = default_frequencies(np.log(poles[poles != 0.0]) / dt)
     return np.append(frequencies[frequencies < np.pi / dt], np.pi / dt)

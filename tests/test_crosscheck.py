@@ -112,6 +112,14 @@ DELICATE: dict[str, Callable[[], SecondOrderModel]] = {
     "static beside dynamic": lambda: mechss(np.diag([1.0, 0.0]), None, np.diag([1.0, 1e6])),
     "slow unit of time": lambda: _in_units_of_time(1e8),
     "fast unit of time": lambda: _in_units_of_time(1e-8),
+    "free pair": lambda: mechss(np.diag([2, 3]), [[4, -4], [-4, 4]], [[12, -12], [-12, 12]]),
+    "free body with inertial coupling": lambda: mechss([[1, -1], [-1, 2]], [[0, 0], [0, 1]], [[0, 0], [0, 4]]),
+    "channel that cancels": lambda: mechss(None, [[-1, 0], [-1, 0]], [[3, -4], [1, 0]]),
+    "channel that cancels at rest": lambda: mechss(None, None, [[4, -3], [1, 0]]),
+    "motion without stiffness": lambda: mechss([[4, 0], [0, 4]], [[1, 0], [4, 4]], None),
+    "pole at the origin alone": lambda: mechss(
+        None, [[4, 0, 4], [0, 0, 0], [4, 0, 4]], [[1, 2, 1], [2, 4, 2], [1, 2, 2]]
+    ),
     "tiny unit of force": lambda: _in_units_of_force(1e-30),
     "huge unit of force": lambda: _in_units_of_force(1e30),
 }
