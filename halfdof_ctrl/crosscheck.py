@@ -15,6 +15,7 @@ from dataclasses import asdict, dataclass
 
 import control
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
@@ -29,8 +30,8 @@ from halfdof_ctrl.spectrum import ROUNDING, eigenvalues_and_rounding
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
-SMALL = 1e-6  #: of the largest: eigenvalues below may stand for one at the origin
-ROUNDING_OF_ZERO = 64 * np.finfo(float).eps  #: of the size of output and input, left of a channel that is zero
+SMALL = 1e-6  #: of the largest or of the typical frequency: eigenvalues below may stand for one at the origin
+ROUNDING_OF_ZERO = 1024 * np.finfo(float).eps  #: of the size of output and input, left of a channel that is zero
 AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
@@ -238,9 +239,13 @@ def _moving(finite: ComplexArray, A: FloatArray, gamma: float) -> ComplexArray:
     away = finite[np.abs(finite) > AT_ORIGIN * gamma]
     if poles.size and away.size:
         nearest = np.abs(away[:, None] - poles).argmin(axis=1)
-        small = np.abs(away) <= SMALL * np.abs(away).max()
-        away = away[~(small & (np.abs(poles) <= rounding)[nearest])]
+        away = away[~(_is_small(away, gamma) & (np.abs(poles) <= rounding)[nearest])]
     return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
+
+
+def _is_small(eigenvalues: ComplexArray, gamma: float) -> npt.NDArray[np.bool_]:
+    """Tell which eigenvalues are so small that they may stand for one at the origin."""
+    return np.asarray(np.abs(eigenvalues) <= SMALL * max(np.abs(eigenvalues).max(initial=0.0), gamma))
 
 
 def _points(moving: ComplexArray) -> ComplexArray:
@@ -261,7 +266,8 @@ def _points(moving: ComplexArray) -> ComplexArray:
 def _compare_poles(A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[float, str]:
     """Match the poles one to one and find the worst of them.
 
-    Where the descriptor form has several eigenvalues at the origin, rounding in A splits them by its square root.
+    Where the descriptor form has several eigenvalues near the origin, rounding splits them by its square root, in
+    A as in QZ.
     """
     if A.shape[0] != finite.size:
         return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
@@ -272,9 +278,9 @@ def _compare_poles(A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[f
     difference = np.abs(poles[rows] - finite[columns])
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         allowed = np.abs(finite[columns]) + (rounding[rows] + ROUNDING * gamma) / POLE_TOLERANCE
-        origin = np.abs(finite[columns]) <= AT_ORIGIN * gamma
-        if np.count_nonzero(origin) > 1:
-            allowed[origin] += np.sqrt(ROUNDING) * np.linalg.norm(A, 2) / POLE_TOLERANCE
+        small = _is_small(finite[columns], gamma)
+        if np.count_nonzero(small) > 1:
+            allowed[small] += np.sqrt(ROUNDING) * max(float(np.linalg.norm(A, 2)), gamma) / POLE_TOLERANCE
         errors = np.where(difference > 0.0, difference / allowed, 0.0)
     worst = int(np.argmax(errors))
     return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"

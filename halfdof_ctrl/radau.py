@@ -25,6 +25,7 @@ from halfdof_ctrl.model import SecondOrderModel
 STAGES = 5
 RESOLUTION = 0.25  #: step length times the size of the fastest eigenvalue that still moves
 GONE = 33.0  #: time constants after which a mode is below rounding, exp(-33) = 5e-15
+GROWN = 5.0  #: time constants for which a growing mode is followed, which multiplies rounding by exp(5) = 150
 MOST_STEPS = 1500  #: steps of one integration; the horizon shrinks where they do not suffice
 
 
@@ -50,6 +51,9 @@ def step_plan(eigenvalues: ComplexArray, most_steps: int = MOST_STEPS) -> tuple[
     if moving.size == 0:
         return (Segment(0.05, 20),)
     horizon = 2.0 * np.pi / float(np.abs(moving).min())
+    growth = float(moving.real.max())
+    if growth > 0.0:
+        horizon = min(horizon, GROWN / growth)
     plan: list[Segment] = []
     time, left = 0.0, most_steps
     with np.errstate(divide="ignore"):

@@ -120,6 +120,8 @@ DELICATE: dict[str, Callable[[], SecondOrderModel]] = {
     "pole at the origin alone": lambda: mechss(
         None, [[4, 0, 4], [0, 0, 0], [4, 0, 4]], [[1, 2, 1], [2, 4, 2], [1, 2, 2]]
     ),
+    "free bar in mixed coordinates": lambda: mechss([[1, 1], [1, 1]], None, [[1, 0], [0, 0]]),
+    "unstable channel that cancels": lambda: mechss(None, [[4, 0], [-2, 0]], [[3, -1], [4, 0]]),
     "tiny unit of force": lambda: _in_units_of_force(1e-30),
     "huge unit of force": lambda: _in_units_of_force(1e30),
 }
