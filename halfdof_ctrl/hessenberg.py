@@ -15,17 +15,15 @@ first order the relative error of a response H = c x is below
     eps |A| |x| |y| / |H|,    (s I - A)^T y = c,    |y| about |x| |c| / |b|,
 
 the last by reciprocity. Where that is much, H is corrected once by the adjoint solution y on the residual in the
-original coordinates, c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where even
-that is no small correction (an output some 1e25 times smaller than the state, at the far end of a chain), a
-sparse LU factorization of s I - A itself keeps the structure and the digits.
+original coordinates, c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where the
+bound exceeds one (at the far end of a long chain) a sparse factorization of s I - A itself keeps the digits.
 """
 
 import numpy as np
 import scipy.linalg
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.sparsesolve import sparse_response
 
 BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
@@ -85,6 +83,10 @@ def _add_channels(
                 response = _real_times_complex(rotated, x)
                 bound = EPS * size * _column_norms(x) ** 2 * lengths[:, None] / abs(solver.beta)
                 small = bound > RISK * np.abs(response)
+                hopeless = bound > np.abs(response)
+            for i in np.flatnonzero(hopeless.any(axis=1)).tolist():
+                response[i, hopeless[i]] = sparse_response(A, B[:, j], C[i], part[hopeless[i]])
+            small &= ~hopeless
             for i in np.flatnonzero(small.any(axis=1)).tolist():
                 if i not in adjoints:
                     adjoints[i] = ShiftedSolver(A.T, C[i])
@@ -109,23 +111,8 @@ def _refined(
     refined = np.asarray(response + correction)
     unsafe = np.abs(correction) > UNSAFE * np.abs(refined)
     if unsafe.any():
-        refined[unsafe] = _by_sparse_factors(A, b, c, points[unsafe])
+        refined[unsafe] = sparse_response(A, b, c, points[unsafe])
     return refined
-
-
-def _by_sparse_factors(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray) -> ComplexArray:
-    """Give ``c (s I - A)^-1 b`` by a sparse factorization at each point."""
-    present = csc_array((A != 0.0) | np.eye(A.shape[0], dtype=bool))
-    columns = np.repeat(np.arange(A.shape[0]), np.diff(present.indptr))
-    entries, diagonal = -A[present.indices, columns].astype(np.complex128), present.indices == columns
-    values = np.empty(points.size, dtype=np.complex128)
-    for k, s in enumerate(points):
-        shifted = csc_array((entries + s * diagonal, present.indices, present.indptr), shape=A.shape)
-        try:
-            values[k] = c @ splu(shifted).solve(b.astype(np.complex128))
-        except RuntimeError:  # a pole
-            values[k] = complex(np.inf, np.nan)
-    return values
 
 
 class ShiftedSolver:
