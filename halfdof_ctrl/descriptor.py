@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.arrays import ComplexArray, Matrix
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
@@ -176,19 +176,26 @@ def typical_frequency(model: SecondOrderModel) -> float:
 
 
 def _time_scale(coefficients: Sequence[Matrix]) -> float:
-    """Give a typical frequency as a power of two: the mean, in the logarithm, of what each row has to say.
+    """Give a typical frequency as a power of two: the mean, in the logarithm, of what each entry has to say.
 
-    A row with entries in R_h and R_l, h > l the highest and the lowest there are, balances at the frequency
-    ``(|R_l| / |R_h|)^(1 / (h - l))``, in any unit of the row.
+    A place (i, j) with entries in R_h and R_l, h > l the highest and the lowest there are, balances at the frequency
+    ``|R_l,ij / R_h,ij|^(1 / (h - l))``, in any unit of its row and column. Where no place has two, rows are asked.
     """
-    sizes = np.array([np.abs(matrix).max(axis=1, initial=0.0) for matrix in coefficients])
-    logs = []
-    for row in sizes.T:
-        present = np.flatnonzero(row)
-        if present.size > 1:
-            low, high = present[0], present[-1]
-            logs.append(np.log2(row[low] / row[high]) / (high - low))
-    return float(2.0 ** np.round(np.mean(logs))) if logs else 1.0
+    sizes = np.array([np.abs(matrix) for matrix in coefficients])
+    logs = _balances(sizes.reshape(len(sizes), -1))
+    if not logs.size:
+        logs = _balances(sizes.max(axis=2, initial=0.0))
+    return float(2.0 ** np.round(logs.mean())) if logs.size else 1.0
+
+
+def _balances(sizes: FloatArray) -> FloatArray:
+    """Give the logarithms of the frequencies at which the lowest and the highest of each column are equal."""
+    present = sizes > 0.0
+    several = present.sum(axis=0) > 1
+    sizes, present = sizes[:, several], present[:, several]
+    low, high = present.argmax(axis=0), len(sizes) - 1 - present[::-1].argmax(axis=0)
+    every = np.arange(sizes.shape[1])
+    return np.asarray(np.log2(sizes[low, every] / sizes[high, every]) / (high - low))
 
 
 def _sorted(values: ComplexArray) -> ComplexArray:
