@@ -30,7 +30,7 @@ from halfdof_ctrl.scaling import equilibrating_factors
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 
 RANK_TOLERANCE = 16 * np.finfo(float).eps  #: times the block's size; singular values below are null
-CANCELLATION = 16 * np.finfo(float).eps  #: times n: entries of C N below this part of their terms' size are zero
+CANCELLATION = 16 * np.finfo(float).eps  #: times n: entries of C T and the like below this part of their terms are zero
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
 PLAIN_SPREAD = 1e5  #: of stiffness over mass between the DOFs; a smaller one needs no closer look
 
@@ -60,6 +60,7 @@ class DofPartition:
     method: Literal["selection", "orthogonal"]
     order: IndexArray  #: (n,) selection: the DOFs in the order inertial, half, static
     basis: FloatArray | None  #: (n, n) T, or None where T is the selection by `order`
+    sizes: FloatArray | None  #: (n, n) what the rounding errors of the entries of T are relative to; None if exact
     in_order: bool  #: selection that leaves the DOFs in their order
     n_inertial: int
     n_half: int
@@ -91,12 +92,15 @@ class DofPartition:
         return unit if self.in_order else np.asarray(unit[:, self.order])
 
     def times_basis(self, matrix: Matrix, first: int, stop: int | None) -> FloatArray:
-        """Give the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns."""
+        """Give the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns.
+
+        Entries that are rounding of a sum whose terms cancel are zero.
+        """
         if self.in_order:
             return matrix[:, first:stop]
-        if self.basis is None:
+        if self.basis is None or self.sizes is None:
             return np.asarray(matrix[:, self.order[first:stop]])
-        return np.asarray(matrix @ self.basis[:, first:stop])
+        return cancelled(matrix, self.basis[:, first:stop], self.sizes[:, first:stop])
 
     def to_coordinates(self, displacements: FloatArray) -> FloatArray:
         """Give ``p = T^-1 q`` for an (n, k) array."""
@@ -136,6 +140,7 @@ def _selection(massive: tuple[bool, ...], damped: tuple[bool, ...], dofs: tuple[
         method="selection",
         order=read_only(np.array(order)),
         basis=None,
+        sizes=None,
         in_order=order == list(every),
         n_inertial=len(with_mass),
         n_half=len(with_damping),
@@ -184,19 +189,20 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
         Within a block that needs mixing the columns of T are orthonormal up to the block's scaling by
         powers of two; elsewhere they select DOFs.
     """
-    massive, massless, first = _null_split("M", model.M, unit_matrix(len(model.dofs)), model.dofs, tol)
-    drag = _cancelled(model.C @ massless.columns, np.abs(model.C) @ massless.sizes)
-    half, still, second = _null_split("C", drag, massless.columns, model.dofs, tol)
-    static = still.columns
-    basis = np.hstack([massive, half, static])
+    unit = unit_matrix(len(model.dofs))
+    massive, massless, first = _null_split("M", model.M, _Span(unit, unit), model.dofs, tol)
+    drag = cancelled(model.C, massless.columns, massless.sizes)
+    half, static, second = _null_split("C", drag, massless, model.dofs, tol)
+    basis = np.hstack([massive.columns, half.columns, static.columns])
     return DofPartition(
         method="orthogonal",
         order=np.arange(basis.shape[0]),
         basis=read_only(basis),
+        sizes=read_only(np.hstack([massive.sizes, half.sizes, static.sizes])),
         in_order=False,
-        n_inertial=massive.shape[1],
-        n_half=half.shape[1],
-        n_static=static.shape[1],
+        n_inertial=massive.columns.shape[1],
+        n_half=half.columns.shape[1],
+        n_static=static.columns.shape[1],
         coordinates=_coordinate_names(basis, model.dofs),
         evidence=(*first, *second),
     )
@@ -230,44 +236,52 @@ def _without_tiny_masses(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _NullSpace:
+class _Span:
     columns: FloatArray  #: (n, d) basis
     sizes: FloatArray  #: (n, d) what the rounding errors of its entries are relative to
 
+    def part(self, which: IndexArray) -> "_Span":
+        return _Span(self.columns[:, which], self.sizes[:, which])
+
 
 def _null_split(
-    letter: Literal["M", "C"], product: FloatArray, columns: FloatArray, dofs: tuple[str, ...], tol: float | None
-) -> tuple[FloatArray, _NullSpace, list[RankDecision]]:
-    """Split the span of `columns` (n, d) into a part where `product` (n, d) has full rank and its null space.
+    letter: Literal["M", "C"], product: FloatArray, span: _Span, dofs: tuple[str, ...], tol: float | None
+) -> tuple[_Span, _Span, list[RankDecision]]:
+    """Split a span of d vectors into a part where `product` (n, d) has full rank and its null space.
 
     A mixed column is known to rounding of the largest entry that its DOF has in the block, times the spread
     of the singular values that count; a column that is taken over is as exact as it was.
     """
-    ranging, null, sizes, evidence = [columns[:, :0]], [columns[:, :0]], [columns[:, :0]], []
+    nothing = span.part(np.zeros(0, dtype=np.intp))
+    ranging, null, evidence = [nothing], [nothing], []
     for block in _linked_columns(product):
-        part = product[:, block]
+        own, part = span.part(block), product[:, block]
         part = part[part.any(axis=1)]
         if part.shape[0] == 0:
-            null.append(columns[:, block])
-            sizes.append(np.abs(columns[:, block]))
+            null.append(own)
             continue
         row_factors, factors = equilibrating_factors(part)
         _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
         bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
         rank = int(np.count_nonzero(values > bound * values[0]))
-        concerned = tuple([dofs[index] for index in np.flatnonzero(columns[:, block].any(axis=1)).tolist()])
+        concerned = tuple([dofs[index] for index in np.flatnonzero(own.columns.any(axis=1)).tolist()])
         evidence.append(RankDecision(matrix=letter, dofs=concerned, singular_values=values, rank=rank))
         if rank == block.size:
-            ranging.append(columns[:, block])
-        else:
-            speck = 4 * max(part.shape) * np.finfo(float).eps * values[0] / values[rank - 1]
-            clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-            mixed = columns[:, block] @ (factors[:, None] * clean)
-            ranging.append(mixed[:, :rank])
-            null.append(mixed[:, rank:])
-            size = np.abs(mixed).max(axis=1, keepdims=True) * (values[0] / values[rank - 1])
-            sizes.append(np.repeat(size, block.size - rank, axis=1))
-    return np.hstack(ranging), _NullSpace(np.hstack(null), np.hstack(sizes)), evidence
+            ranging.append(own)
+            continue
+        spread = values[0] / values[rank - 1]
+        speck = 4 * max(part.shape) * np.finfo(float).eps * spread
+        clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
+        mixed = own.columns @ (factors[:, None] * clean)
+        size = (own.sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True) * spread
+        whole = _Span(mixed, np.repeat(size, block.size, axis=1))
+        ranging.append(whole.part(np.arange(rank)))
+        null.append(whole.part(np.arange(rank, block.size)))
+    return _joined(ranging), _joined(null), evidence
+
+
+def _joined(spans: list[_Span]) -> _Span:
+    return _Span(np.hstack([span.columns for span in spans]), np.hstack([span.sizes for span in spans]))
 
 
 def _linked_columns(product: FloatArray) -> list[IndexArray]:
@@ -282,9 +296,11 @@ def _linked_columns(product: FloatArray) -> list[IndexArray]:
     return [np.array(group) for group in groups.values()]
 
 
-def _cancelled(product: FloatArray, size: FloatArray) -> FloatArray:
-    """Set entries to zero that are rounding of a sum whose terms cancel; `size` adds up the terms."""
-    return np.where(np.abs(product) <= CANCELLATION * product.shape[0] * size, 0.0, product)
+def cancelled(matrix: FloatArray, columns: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Multiply, and set entries to zero that are rounding of a sum whose terms cancel."""
+    product = matrix @ columns
+    noise = CANCELLATION * len(matrix) * (np.abs(matrix) @ sizes)
+    return np.where(np.abs(product) <= noise, 0.0, product)
 
 
 def _coordinate_names(basis: FloatArray, dofs: tuple[str, ...]) -> tuple[str, ...]:

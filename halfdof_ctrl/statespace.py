@@ -163,14 +163,16 @@ def _sizes(reduction: ExactReduction) -> tuple[FloatArray, Signal]:
     part, model, A = reduction.partition, reduction.model, np.abs(reduction.A)
     n_i, moving = part.n_inertial, part.n_inertial + part.n_half
     scale = np.ones(len(model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
+    known_to = np.abs(part.T) if part.sizes is None else part.sizes
     rates, statics = [], []
     for force in (model.B, model.Bv, model.Ba):
         solution = np.abs(reduction.leading.solve(np.asfortranarray(force))) / scale[:, None]
         size = scale[:, None] * solution.max(axis=0)
         rates.append(np.vstack([np.zeros_like(size[:n_i]), size[n_i:moving], size[:n_i]]))
-        statics.append(np.abs(part.T[:, moving:]) @ size[moving:])
+        statics.append(known_to[:, moving:] @ size[moving:])
     shift = rates[1] + A @ rates[2]
     X = np.abs(reduction.displacement.X)
+    X[:, :moving] = np.maximum(X[:, :moving], known_to[:, :moving])
     return rates[0] + A @ shift, Signal(X, (statics[0] + X @ shift, statics[1] + X @ rates[2], statics[2]))
 
 

@@ -8,7 +8,17 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from structures import Structure, damped_structures, on_axis, passive, semidefinite, structures
+from structures import (
+    Structure,
+    damped_structures,
+    gyroscopic,
+    null_columns,
+    on_axis,
+    passive,
+    rank_deficient,
+    semidefinite,
+    structures,
+)
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.errors import (
@@ -60,6 +70,32 @@ def assert_same_transfer(
 def test_order_is_the_degree_of_the_determinant(structure: Structure) -> None:
     """The number of states is ``deg det P(s)`` in exact arithmetic, or W is exactly singular."""
     assert reduced(structure).order == exact.order(*structure.matrices)
+
+
+@given(structure=structures(rank_deficient, gyroscopic, null_columns, largest=3))
+def test_order_of_small_structures_is_exact(structure: Structure) -> None:
+    """With few DOFs and small integers W is often exactly singular, or nearly so by rounding: never accepted."""
+    assert reduced(structure).order == exact.order(*structure.matrices)
+
+
+@pytest.mark.parametrize(
+    ("M", "C", "K"),
+    [
+        ([[0, 0], [-2, -2]], [[0, 0], [0, 0]], [[-2, -2], [-1, 1]]),
+        ([[4, -4], [0, 0]], [[2, -2], [0, 0]], [[-4, 0], [-1, 1]]),
+        ([[0, 0], [0, 0]], [[0, 0], [-2, 2]], [[-2, 2], [-4, -2]]),
+        ([[2, -2], [0, 0]], [[0, 3], [6, -6]], [[-1, 0], [-2, -3]]),
+        ([[-2, 2], [0, 0]], [[-1, 1], [1, -1]], [[-2, -4], [2, -2]]),
+        ([[0, 0], [0, 0]], [[3, -3], [1, -1]], [[0, 0], [4, -4]]),
+    ],
+)
+def test_rounding_in_null_vectors_does_not_hide_a_singular_leading_matrix(
+    M: list[list[int]], C: list[list[int]], K: list[list[int]]
+) -> None:
+    """W is exactly singular; only rounding of C T_c or K T_k, equilibrated, makes it look regular."""
+    assert exact.leading_matrix_is_singular(M, C, K)
+    with pytest.raises(SingularLeadingMatrixError, match="singular to working precision"):
+        exact_reduction(mechss(M, C, K))
 
 
 @given(structure=structures())
