@@ -23,7 +23,7 @@ from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
-from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, equilibrating_powers, finite_part
+from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, balancing_powers, equilibrating_powers, finite_part
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where det P(s) is looked at, in units of the time scale
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
@@ -146,7 +146,7 @@ def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float
     """Deflate the pencil (8) of ``R_0 + R_1 s + R_2 s^2``; its eigenvalues are in units of the scale given back."""
     scale = _time_scale(coefficients)
     R0, R1, R2 = (matrix * scale**power for power, matrix in enumerate(coefficients))
-    rows, columns = equilibrating_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
+    rows, columns = balancing_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
     R0, R1, R2 = (matrix * rows[:, None] * columns for matrix in (R0, R1, R2))
     left, right = _low_rank_factors(R2)
     rank = right.shape[0]

@@ -260,7 +260,7 @@ def _null_split(
         if part.shape[0] == 0:
             null.append(own)
             continue
-        row_factors, factors = equilibrating_factors(part)
+        row_factors, factors = equilibrating_factors(part, even=2.0)
         _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
         bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
         rank = int(np.count_nonzero(values > bound * values[0]))

@@ -25,6 +25,7 @@ EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
 NOISE = 32.0  #: entries within so many of their mean rounding errors are zero
 SWEEPS = 10  #: equilibration passes over rows and columns
+SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -207,7 +208,24 @@ def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Rows and columns are divided by the square roots of their maxima in turns, zero ones left alone.
     """
-    rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
+    return _with_maxima_near_one(size, np.ones(size.shape[0]), np.ones(size.shape[1]))
+
+
+def balancing_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give powers of two for rows and columns that bring their entries near one.
+
+    First in the mean of the logarithms, which has one solution whatever the units were (A. R. Curtis and J. K. Reid,
+    1972), then the largest entries.
+    """
+    present = (size > 0.0).astype(float)
+    logs = np.log2(np.where(size > 0.0, size, 1.0))
+    normal = np.block([[np.diag(present.sum(axis=1)), present], [present.T, np.diag(present.sum(axis=0))]])
+    right = -np.concatenate([logs.sum(axis=1), logs.sum(axis=0)])
+    means = np.exp2(np.linalg.solve(normal + SHIFT * np.eye(len(normal)), right))
+    return _with_maxima_near_one(size, means[: size.shape[0]], means[size.shape[0] :])
+
+
+def _with_maxima_near_one(size: FloatArray, rows: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
     for _ in range(SWEEPS):
         scaled = size * rows[:, None] * columns
         down, across = np.sqrt(scaled.max(axis=1, initial=0.0)), np.sqrt(scaled.max(axis=0, initial=0.0))
