@@ -51,7 +51,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     Returns
     -------
     PencilStructure
-        With a singular pencil the finite eigenvalues are those of its regular part.
+        With a singular pencil (`is_regular` False) the finite eigenvalues mean nothing.
 
     Examples
     --------
@@ -88,7 +88,8 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     -------
     (k,) complex ndarray
         Finite zeros [rad/s], sorted by size. Among them are poles of motions that the inputs do not
-        reach or the outputs do not show.
+        reach or the outputs do not show. None are given where inputs and outputs are both dependent, as those of
+        a transfer function that is zero everywhere.
 
     Raises
     ------
@@ -112,6 +113,8 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
         )
     ]
     part, scale = _quadratic_pencil(blocks)
+    if part.is_deficient:
+        return np.zeros(0, dtype=np.complex128)
     return _sorted(part.eigenvalues * scale)
 
 

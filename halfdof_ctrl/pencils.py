@@ -23,7 +23,7 @@ from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
 
 EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
-NOISE = 32.0  #: entries within so many of their mean rounding errors are zero
+NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
 SWEEPS = 10  #: equilibration passes over rows and columns
 SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
 
@@ -35,6 +35,7 @@ class FinitePart:
     eigenvalues: ComplexArray  #: finite eigenvalues, by QZ on irreducible blocks
     steps: tuple[int, ...]  #: eigenvalues at infinity deflated in each step; their number is the index
     is_regular: bool  #: False if the pencil is not square or its determinant vanishes identically
+    is_deficient: bool  #: rows and columns are both dependent at every s; the eigenvalues are not reliable then
     gap: float  #: smallest ratio, over all rank decisions, of a pivot that counts to one that does not
 
 
@@ -49,19 +50,22 @@ def finite_part(A: Matrix, E: Matrix) -> FinitePart:
     Returns
     -------
     FinitePart
-        For a singular pencil, the eigenvalues of its regular part.
+        For a non-square pencil of full rank, the eigenvalues of its regular part.
     """
-    rows = _deflated(_Pencil.exact(A, E))
+    pencil = _Pencil.exact(A, E)
+    rows = _deflated(pencil.equilibrated())
     columns = _deflated(rows.pencil.transposed())
-    regular = A.shape[0] == A.shape[1] and not rows.redundant and not columns.steps
-    blockwise = _blockwise_eigenvalues(_Pencil.exact(A, E)) if A.shape[0] == A.shape[1] else None
-    if blockwise is None:
-        blockwise = columns.pencil.eigenvalues()
-        regular = regular and A.shape[0] == A.shape[1]
+    square = A.shape[0] == A.shape[1]
+    eigenvalues = _blockwise_eigenvalues(pencil) if square else None
+    if eigenvalues is None:  # rounding can lose eigenvalues of a singular pencil, not invent them: try both orders
+        first = _deflated(pencil.transposed().equilibrated())
+        both = (columns.pencil.eigenvalues(), _deflated(first.pencil.transposed()).pencil.eigenvalues())
+        eigenvalues = max(both, key=len)
     return FinitePart(
-        eigenvalues=blockwise,
+        eigenvalues=eigenvalues,
         steps=tuple(rows.steps),
-        is_regular=regular,
+        is_regular=square and not rows.redundant and not columns.steps,
+        is_deficient=bool(rows.redundant and columns.steps),
         gap=min(rows.gap, columns.gap),
     )
 
@@ -129,7 +133,7 @@ def _deflated(pencil: _Pencil) -> _Deflated:
     steps: list[int] = []
     redundant, gap = 0, float("inf")
     while True:
-        step = _deflated_once(pencil.equilibrated())
+        step = _deflated_once(pencil)
         pencil, gap = step.pencil, min(gap, step.gap)
         if step.algebraic == 0:
             return _Deflated(pencil, steps, redundant, gap)

@@ -252,3 +252,10 @@ def test_redundant_constraint_is_a_singular_pencil() -> None:
     with pytest.raises(SingularPencilError, match="a constraint that stands twice") as refusal:
         require_regular(mechss(M, None, K, dofs=["a", "b", "force1", "force2"]))
     assert refusal.value.dofs == ("force1", "force2")
+
+
+def test_dependent_inputs_and_outputs_have_no_zeros() -> None:
+    """Two forces on and two displacements of one mass, and a transfer function that is zero everywhere."""
+    model = mechss([[1.0, 0.0], [0.0, 0.0]], None, [[2.0, 0.0], [0.0, 1.0]], [[1, 2], [0, 0]], [[1, 0], [3, 0]])
+    assert zeros(model).size == 0
+    assert zeros(hydromount(C_rs=0.0, K_v=0.0).select("F_y1", "y")).size == 0
