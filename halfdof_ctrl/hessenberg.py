@@ -31,7 +31,7 @@ HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is sca
 UNREACHED = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
 EPS = float(np.finfo(float).eps)
 UNSAFE = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
-RISK = 1e-9  #: bound of the relative error above which a response is corrected; it exceeds the error by far
+RISK = 1e-8  #: bound of the relative error above which a response is corrected; it exceeds the error by far
 
 
 def state_space_response(

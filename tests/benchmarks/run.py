@@ -106,7 +106,7 @@ def measure_frequency_response() -> None:
     """1000 points of a chain with massless nodes, and how far both are from a direct solve.
 
     From one end to the other the response rolls off below anything that a plot shows; digits there are worth
-    the time that they take, and are compared point by point.
+    the time that they take.
     """
     for states, far_end in [(states, False) for states in STATE_COUNTS] + [(100, True)]:
         system = chain(states, far_end)
@@ -119,12 +119,13 @@ def measure_frequency_response() -> None:
         )
         what = f"frequency_response, {states} states" + (", deep roll-off" if far_end else "")
         report(what, ours, theirs, "control.frequency_response", "(none)" if far_end else ">= 5")
+        if far_end:  # a plain solve is no reference there; tests/test_hessenberg.py has one in many digits
+            continue
         few = omega[:: POINTS // 20]
         unit = np.eye(system.nstates)
         exact = np.array([(system.C @ np.linalg.solve(1j * w * unit - system.A, system.B))[0, 0] for w in few])
-        scale = np.abs(exact) if far_end else np.abs(exact).max()
         errors = [
-            (np.abs(compute(system, few).frdata[0, 0] - exact) / scale).max()
+            np.abs(compute(system, few).frdata[0, 0] - exact).max() / np.abs(exact).max()
             for compute in (hd.frequency_response, control.frequency_response)
         ]
         print(f"{'':46} error against direct solves: {errors[0]:.1e} (ours) {errors[1]:.1e} (control)")
