@@ -99,6 +99,11 @@ def unit_matrix(size: int) -> FloatArray:
     return _small_unit(size) if size * size <= SHARED_SIZE else read_only(np.eye(size))
 
 
+def powers_of_two(size: FloatArray) -> FloatArray:
+    """Powers of two that bring sizes to between 1/2 and 1, and 1 for a zero."""
+    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
+
+
 def is_complex(matrix: Matrix) -> bool:
     """Tell whether a checked matrix has imaginary parts."""
     return matrix.dtype != REAL

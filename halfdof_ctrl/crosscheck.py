@@ -19,7 +19,7 @@ import numpy.typing as npt
 import scipy.linalg
 import scipy.optimize
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, powers_of_two
 from halfdof_ctrl.descriptor import pencil_structure, require_regular, typical_frequency
 from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.model import SecondOrderModel
@@ -294,7 +294,7 @@ def _compare_steps(model: SecondOrderModel, system: _Balanced, moving: ComplexAr
     exact = descriptor_step_response(model, plan)
     found = np.empty_like(exact)
     drives, gauges = (
-        _powers_of_two(np.abs(part).max(axis=axis, initial=0.0)) for axis, part in enumerate((system.B, system.C))
+        powers_of_two(np.abs(part).max(axis=axis, initial=0.0)) for axis, part in enumerate((system.B, system.C))
     )
     unit = gauges[:, None] * drives
     scaled = control.StateSpace(system.A, system.B * drives, gauges[:, None] * system.C, system.D * unit)
@@ -329,11 +329,6 @@ def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
     with np.errstate(invalid="ignore"):
         by_input = (largest / by_output).max(axis=0, keepdims=True)
     return np.asarray(ROUNDING_OF_ZERO * by_output * by_input)
-
-
-def _powers_of_two(size: FloatArray) -> FloatArray:
-    """Powers of two that bring sizes near one, 1 for a zero."""
-    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
 
 
 def _place_of_largest(errors: FloatArray) -> tuple[int, int, int]:

@@ -9,7 +9,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.arrays import ComplexArray, Matrix, powers_of_two
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
@@ -57,8 +57,8 @@ def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArra
 
 def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
     """Solve ``P x = B`` for a stack of matrices, equilibrated."""
-    rows = _power_of_two_below(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
-    columns = _power_of_two_below(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
+    rows = powers_of_two(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
+    columns = powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
     scaled, right = P * rows * columns, B * rows
     solution = _solve_each(scaled, right)
     residual = right - scaled @ solution
@@ -78,8 +78,3 @@ def _solve_each(P: ComplexArray, B: ComplexArray) -> ComplexArray:
             return np.full(B.shape, complex(np.inf, np.nan))
         half = P.shape[0] // 2
         return np.concatenate([_solve_each(P[:half], B[:half]), _solve_each(P[half:], B[half:])])
-
-
-def _power_of_two_below(size: FloatArray) -> FloatArray:
-    """Powers of two that bring the sizes to between 1/2 and 1 (1 for a zero)."""
-    return np.ldexp(1.0, -np.frexp(size)[1])

@@ -19,7 +19,7 @@ import scipy.linalg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 
 EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
@@ -235,8 +235,3 @@ def _with_maxima_near_one(size: FloatArray, rows: FloatArray, columns: FloatArra
         down, across = np.sqrt(scaled.max(axis=1, initial=0.0)), np.sqrt(scaled.max(axis=0, initial=0.0))
         rows, columns = rows / np.where(down > 0.0, down, 1.0), columns / np.where(across > 0.0, across, 1.0)
     return np.exp2(np.round(np.log2(rows))), np.exp2(np.round(np.log2(columns)))
-
-
-def powers_of_two(size: FloatArray) -> FloatArray:
-    """Powers of two that bring sizes to between 1/2 and 1, and 1 for a zero."""
-    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))

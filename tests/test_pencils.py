@@ -6,7 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from halfdof_ctrl.pencils import equilibrating_powers, finite_part, powers_of_two
+from halfdof_ctrl.arrays import powers_of_two
+from halfdof_ctrl.pencils import equilibrating_powers, finite_part
 
 EIGENVALUES = 1e-9  # after transformations of condition up to 1e3 on at most 10 unknowns
 
