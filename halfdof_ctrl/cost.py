@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfdof_ctrl.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.errors import ImproperError, WeightError
 from halfdof_ctrl.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.partition import DofPartition
 from halfdof_ctrl.reduction import ExactReduction
 from halfdof_ctrl.statespace import mech2ss
 
@@ -105,7 +106,10 @@ def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatA
         msg = "The energy of a model on which derivatives of inputs act (Bv, Ba) is no function of its states alone."
         raise WeightError(msg, names=("energy",))
     n, m = reduction.B.shape
-    velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    if isinstance(part, DofPartition):  # only what has mass, whose velocity is a state
+        velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    else:
+        velocity = reduction.motion(1).X
     displacement = reduction.displacement
     return [
         (velocity, np.zeros((len(model.dofs), m)), 0.5 * weight * model.M),

@@ -48,6 +48,20 @@ def motion_names(dofs: tuple[str, ...], derivative: int) -> tuple[str, ...]:
     return tuple([dof + suffix for dof in dofs])
 
 
+def derivative_name(dof: str, order: int, dofs: tuple[str, ...]) -> str:
+    """Name any derivative of a DOF's displacement, clear of the names of the other DOFs' motions.
+
+    >>> derivative_name("y", 3, ("y",))
+    'y_d3'
+    """
+    if order < len(DERIVATIVE_SUFFIXES):
+        return dof + DERIVATIVE_SUFFIXES[order]
+    name = f"{dof}_d{order}"
+    while name in motions(dofs):
+        name += "_"
+    return name
+
+
 @lru_cache(maxsize=256)
 def force_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the unit forces on the DOFs."""
