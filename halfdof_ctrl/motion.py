@@ -39,7 +39,7 @@ from halfdof_ctrl.names import (
 
 MotionKind: TypeAlias = Literal["displacement", "velocity", "acceleration"]
 
-KINDS: tuple[MotionKind, ...] = get_args(MotionKind)  #: in the order of the derivative
+KINDS: tuple[MotionKind, ...] = get_args(MotionKind)  # in the order of the derivative
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

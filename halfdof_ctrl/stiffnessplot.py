@@ -1,6 +1,6 @@
 """Dynamic stiffness and loss angle, transmissibility and phase, over frequency as mount engineers read them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, TypeAlias, get_args
 
 import control
@@ -35,7 +35,7 @@ from halfdof_ctrl.stiffness import (
 )
 
 Scale: TypeAlias = Literal["linear", "log"]
-Models: TypeAlias = SecondOrderModel | Sequence[SecondOrderModel]
+Models: TypeAlias = SecondOrderModel | Iterable[SecondOrderModel]
 Labels: TypeAlias = str | Sequence[str] | None
 
 SCALES: tuple[Scale, ...] = get_args(Scale)
@@ -191,7 +191,8 @@ def transmissibility_plot(
 
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
     """Give the models as a list, and the text of each in the legend; an underscore keeps it out."""
-    models = [sysdata] if isinstance(sysdata, SecondOrderModel) else list(sysdata) if np.iterable(sysdata) else []
+    given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
+    models = list(given) if isinstance(given, Iterable) else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
         msg = f"sysdata must be a SecondOrderModel or a list of some, not {type(sysdata).__name__}."
         raise ParameterError(msg, parameter="sysdata", value=sysdata)
