@@ -112,8 +112,9 @@ def dynamic_stiffness_plot(
     if omega is None:
         omega = motion_frequencies(models, dof, free=True, linear=xscale == "linear")
     responses = [dynamic_stiffness_response(model, dof, omega) for model in models]
-    axes, names = _prepared(ax, "modulus and loss angle"), as_tuple(dof)
+    names = as_tuple(dof)
     unit = _ratio_unit(models[0], units, force_names(names), names)
+    axes = _prepared(ax, "modulus and loss angle")
     lines = _draw(axes, responses, texts, Hz=Hz)
     label_y(axes[0, 0], f"dynamic stiffness\nat {plain('+'.join(names))}{unit}")
     label_y(axes[1, 0], "loss angle [deg]")
@@ -173,11 +174,12 @@ def transmissibility_plot(
     if omega is None:
         omega = motion_frequencies(models, from_ if kind == "motion" else to, linear=xscale == "linear")
     responses = [transmissibility_response(model, from_, to, omega, kind=kind) for model in models]
-    axes, causes, results = _prepared(ax, "modulus and phase"), as_tuple(from_), as_tuple(to)
+    causes, results = as_tuple(from_), as_tuple(to)
     unit = _ratio_unit(models[0], units, results, causes)
     if kind == "force":
         unit = _ratio_unit(models[0], units, force_names(results), force_names(causes))
         causes, results = force_names(causes), reaction_names(results)
+    axes = _prepared(ax, "modulus and phase")
     lines = _draw(axes, responses, texts, Hz=Hz)
     label_y(axes[0, 0], f"transmissibility\n|{plain('+'.join(results))}/{plain('+'.join(causes))}|{unit}")
     label_y(axes[1, 0], "phase [deg]")

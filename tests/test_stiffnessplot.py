@@ -34,7 +34,8 @@ PLOTS = pytest.mark.parametrize("plot", [STIFFNESS, TRANSMISSIBILITY], ids=["sti
 
 @pytest.fixture(autouse=True)
 def _no_figures_left() -> Iterator[None]:
-    """Close what a test drew."""
+    """Close what others left, and what a test drew."""
+    plt.close("all")
     yield
     plt.close("all")
 
@@ -133,8 +134,10 @@ def test_unit_follows_the_dof() -> None:
     assert label == "dynamic stiffness\nat phi+x"
     label = transmissibility_plot(shaft, "phi", "x", units={"phi": "rad"}).axes[0, 0].get_ylabel()
     assert label == "transmissibility\n|x/phi| [m/rad]"
+    plt.close("all")
     with pytest.raises(SignalNameError, match="no signal 'psi'"):
         dynamic_stiffness_plot(shaft, "phi", units={"psi": "rad"})
+    assert plt.get_fignums() == []
 
 
 @PLOTS
