@@ -95,6 +95,12 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
     """Give the rows and weights of the kinetic and the elastic energy."""
     model, part = reduction.model, reduction.partition
+    if model.prescribed:
+        msg = (
+            f"The motion of {listed(model.prescribed)} is prescribed, so that the mechanical energy is no function of "
+            "the states alone. Weight displacements and velocities instead."
+        )
+        raise WeightError(msg, names=("energy",))
     for letter, matrix in (("M", model.M), ("K", model.K)):
         if not _is_symmetric(matrix) or _smallest_eigenvalue(matrix) < -INDEFINITE:
             msg = (

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.errors import ImproperError, ParameterError, SignalNameError
-from halfdof_ctrl.model import Names, SecondOrderModel, mechss
-from halfdof_ctrl.names import control_label, control_labels, listed
+from halfdof_ctrl.model import SecondOrderModel, mechss
+from halfdof_ctrl.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.signals import Signal
 
@@ -141,7 +141,8 @@ def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:
     msg = (
         f"No state space has the improper transfer functions {shown}: the output follows a derivative of the input, as "
         "the velocity of a static DOF or the acceleration of a half DOF does under a force of its own. Take another "
-        "output or input by select(), give the DOF its mass or damping, or filter the input; "
+        "output or input by select(), give the DOF its mass or damping, prescribe the acceleration "
+        "instead of the displacement, or filter the input; "
         "model(s) and descriptor_response evaluate it as it is."
     )
     return ImproperError(msg, pairs=pairs)
