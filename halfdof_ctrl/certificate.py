@@ -80,6 +80,8 @@ class ScaledPencil:
             if self._smallest(s) < RESOLVED:
                 continue
             direct = np.linalg.solve(P, B)
+            if not direct.any():
+                continue
             found = equations.displacement.X @ np.linalg.solve(s * np.eye(N) - equations.A, equations.B.astype(complex))
             for power, part in enumerate(equations.displacement.U):
                 found = found + s**power * part

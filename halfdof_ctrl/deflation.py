@@ -116,8 +116,10 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
         rounding=Rounding(
             relative=ROUNDING,
             A=_size(A, dA),
-            B=_size(B, dB),
-            displacement=Signal(_size(X, dX), tuple([_size(part, error) for part, error in zip(U, dU, strict=True)])),
+            B=_size_of_columns(B, dB),
+            displacement=Signal(
+                _size(X, dX), tuple([_size_of_columns(part, error) for part, error in zip(U, dU, strict=True)])
+            ),
         ),
         rcond=rcond,
     )
@@ -202,7 +204,8 @@ class _Chain:
         leading = LeadingMatrix.factorized(matrix)
         value = leading.solve(np.asfortranarray(right.value))
         inverse = leading.solve(np.eye(rows.size, order="F"))
-        square = inverse**2 @ (right.square + (variance + EPS**2 * matrix**2) @ value**2)
+        eliminated = EPS * leading.elimination_size()
+        square = inverse**2 @ (right.square + (variance + eliminated**2) @ value**2)
         nothing = np.abs(value) <= caution.entry * np.sqrt(square)
         return _Uncertain(np.where(nothing, 0.0, value), np.where(nothing, 0.0, square)), leading.rcond
 
@@ -215,6 +218,11 @@ def _levels(offsets: Offsets) -> int:
 def _size(value: FloatArray, error: FloatArray) -> FloatArray:
     """Give what the error is relative to."""
     return np.maximum(np.abs(value), error / ROUNDING)
+
+
+def _size_of_columns(value: FloatArray, error: FloatArray) -> FloatArray:
+    """Give the same, where an input's column is known to rounding of its largest entry in scaled unknowns only."""
+    return np.maximum(_size(value, error), np.abs(value).max(axis=0, initial=0.0))
 
 
 def _rescaled_equations(equations: StateEquations, states: FloatArray, units: Units) -> StateEquations:
