@@ -222,7 +222,7 @@ def _size(value: FloatArray, error: FloatArray) -> FloatArray:
 
 def _size_of_columns(value: FloatArray, error: FloatArray) -> FloatArray:
     """Give the same, where an input's column is known to rounding of its largest entry in scaled unknowns only."""
-    return np.maximum(_size(value, error), np.abs(value).max(axis=0, initial=0.0))
+    return np.asarray(np.maximum(_size(value, error), np.abs(value).max(axis=0, initial=0.0)))
 
 
 def _rescaled_equations(equations: StateEquations, states: FloatArray, units: Units) -> StateEquations:
