@@ -7,11 +7,13 @@ from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files import load_model, load_system, save_model, save_response, save_system
 from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.mounts import hydromount
-from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot, sweep_plot
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.report import write_report
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
+from halfdof_ctrl.sweep import sweep
+from halfdof_ctrl.sweepresult import SweepFailure, SweepResult
 
 __version__ = "0.1.0"
 
@@ -22,6 +24,8 @@ __all__ = [
     "PencilStructure",
     "SecondOrderModel",
     "StateFeedback",
+    "SweepFailure",
+    "SweepResult",
     "bode_plot",
     "crosscheck",
     "descriptor_response",
@@ -39,6 +43,8 @@ __all__ = [
     "save_response",
     "save_system",
     "step_plot",
+    "sweep",
+    "sweep_plot",
     "write_report",
     "zeros",
 ]
