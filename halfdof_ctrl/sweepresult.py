@@ -127,15 +127,15 @@ def _fitting(outcome: Outcome, first: CaseResult) -> Outcome:
     if isinstance(outcome, CaseError):
         return outcome
     message = ""
-    if (outcome.inputs, outcome.outputs) != (first.inputs, first.outputs):
-        message = (
-            f"inputs {listed(outcome.inputs)} and outputs {listed(outcome.outputs)} are others than those of the first "
-            f"case, {listed(first.inputs)} and {listed(first.outputs)}. Pick the same by inputs and outputs."
-        )
-    elif _dimensions(outcome.value) != _dimensions(first.value):
+    if _dimensions(outcome.value) != _dimensions(first.value):
         message = (
             f"the function gave {_described(outcome.value)} here, but {_described(first.value)} in the first case. "
             "Let it give arrays of one kind."
+        )
+    elif (outcome.inputs, outcome.outputs) != (first.inputs, first.outputs):
+        message = (
+            f"inputs {listed(outcome.inputs)} and outputs {listed(outcome.outputs)} are others than those of the first "
+            f"case, {listed(first.inputs)} and {listed(first.outputs)}. Pick the same by inputs and outputs."
         )
     return CaseError(kind="ShapeError", message=message, traceback="") if message else outcome
 

@@ -197,11 +197,30 @@ def run_chunk(work: Work, items: list[Any], threads: int) -> tuple[list[Any], fl
 
 
 class _Limit:
-    """How many chunks are at work in this process, and what gives its threads back after the last one."""
+    """How many chunks are at work in this process, and who keeps its threads down for all of them."""
 
     lock = threading.Lock()
     users = 0
-    restore: Callable[[], None] | None = None
+    keeper: "_Keeper"
+
+
+class _Keeper(threading.Thread):
+    """Holds the limit, since OpenBLAS with its own threads listens only to the thread that was first to set one."""
+
+    def __init__(self, most: int) -> None:
+        super().__init__(name="halfdof_ctrl thread limit", daemon=True)
+        self.controller = _thread_controller(len(sys.modules))
+        self.limits: dict[str, int] = {}
+        for library in self.controller.info():
+            prefix = library["prefix"]
+            self.limits[prefix] = min(self.limits.get(prefix, most), library["num_threads"])
+        self.is_set, self.is_over = threading.Event(), threading.Event()
+
+    def run(self) -> None:
+        """Set the limit, and undo it when it is over."""
+        with self.controller.limit(limits=self.limits):
+            self.is_set.set()
+            self.is_over.wait()
 
 
 @contextmanager
@@ -210,31 +229,24 @@ def limited_threads(most: int) -> Iterator[None]:
     with _Limit.lock:
         _Limit.users += 1
         if _Limit.users == 1:
-            _Limit.restore = _limit_threads(most)
+            _Limit.keeper = _Keeper(most)
+            _Limit.keeper.start()
+            _Limit.keeper.is_set.wait()
+        keeper = _Limit.keeper
     try:
-        yield
+        with keeper.controller.limit(limits=keeper.limits):  # OpenMP asks every thread for its own limit
+            yield
     finally:
         with _Limit.lock:
             _Limit.users -= 1
-            if _Limit.users == 0 and _Limit.restore is not None:
-                _Limit.restore()
-
-
-def _limit_threads(most: int) -> Callable[[], None]:
-    """Lower the number of threads of every library, and give what undoes it."""
-    controller = _thread_controller()
-    found: dict[str, int] = {}
-    for library in controller.info():
-        prefix = library["prefix"]
-        found[prefix] = min(found.get(prefix, most), library["num_threads"])
-    limiter = controller.limit(limits=found)
-    restore: Callable[[], None] = limiter.restore_original_limits
-    return restore
+            if _Limit.users == 0:
+                keeper.is_over.set()
+                keeper.join()
 
 
 @lru_cache(maxsize=1)
-def _thread_controller() -> Any:  # noqa: ANN401  # threadpoolctl has no types
-    """Look for the libraries with threads once, after NumPy and SciPy have loaded theirs."""
+def _thread_controller(modules: int) -> Any:  # noqa: ANN401, ARG001  # threadpoolctl has no types
+    """Look for the libraries with threads; again when there are more modules, which may have brought some."""
     from threadpoolctl import ThreadpoolController  # noqa: PLC0415  # only workers need it
 
     return ThreadpoolController()

@@ -20,6 +20,7 @@ from halfdof_ctrl.errors import (
     SingularPencilError,
     StabilizationError,
     WeightError,
+    WorkerError,
 )
 
 EXAMPLES: list[HalfdofError] = [
@@ -34,6 +35,7 @@ EXAMPLES: list[HalfdofError] = [
     WeightError("negative", names=("a",)),
     StabilizationError("unstable", eigenvalue=1 + 2j, quantity="a"),
     FileFormatError("truncated", path="model.npz"),
+    WorkerError("cannot start", function="hydromount"),
 ]
 
 
