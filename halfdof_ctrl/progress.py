@@ -74,7 +74,8 @@ def progress_bar(total: int | None, what: str, *, show: bool | None = None) -> I
     from tqdm import tqdm  # noqa: PLC0415  # costs time, which a bare import of the package does not need
 
     hidden = _SILENT.get() or sys.stderr is None or not (_is_watched() if show is None else show)
-    with tqdm(total=total, desc=what, disable=hidden, delay=DELAY, file=sys.stderr) as bar:
+    switch = {"disable": True} if hidden else {}  # otherwise left to the user, who may have set TQDM_DISABLE
+    with tqdm(total=total, desc=what, delay=DELAY, file=sys.stderr, **switch) as bar:
 
         def advance(steps: int) -> None:
             bar.update(steps)

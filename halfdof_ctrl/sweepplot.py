@@ -22,7 +22,7 @@ from halfdof_ctrl.sweepresult import SweepResult
 
 Kind: TypeAlias = Literal["bode", "poles"]
 
-MANY = 40  #: from so many curves on they are drawn thinner
+MANY = 12  #: from so many curves on they are drawn thinner
 BRANCH: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "label": "_branch", "zorder": 2.4}
 FIRST: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
 BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
@@ -134,7 +134,7 @@ def _draw_curves(
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     omega, lines = np.asarray(result.omega), no_lines(axes)
     curves = np.asarray(result.response).reshape(-1, p, m, omega.size)[cases.numbers]
-    width = 1.5 if len(curves) < MANY else 0.8
+    width = 1.5 if len(curves) < MANY else 0.9
     for (i, j), place in product(np.ndindex(p, m), range(len(curves))):
         style = {"color": cases.colours[place], "linewidth": width, "label": _label(cases, place)}
         values, x = curves[place, i, j], scales.frequency(omega)

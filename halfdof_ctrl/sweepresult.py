@@ -51,7 +51,9 @@ class SweepResult:
     discrete: bool  #: whether the systems are sampled state spaces, with poles in z
     response: ComplexArray | None  #: (..., p, m, k) frequency response
     poles: ComplexArray | None  #: (..., N) [rad/s], sorted by size
-    values: npt.NDArray[Any] | None  #: (..., *) what a function gave; NaN fills up where shapes differ
+    values: (
+        npt.NDArray[Any] | None
+    )  #: (...) numbers or arrays that a function gave; NaN fills up where they differ in shape
     failures: tuple[SweepFailure, ...]  #: cases that failed, in order
 
     @property

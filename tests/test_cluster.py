@@ -84,11 +84,11 @@ def test_mpi_workers_give_the_poles(tmp_path: Path) -> None:
         pytest.skip("no mpiexec")
     script = tmp_path / "sweep_by_mpi.py"
     script.write_text(MPI_SCRIPT, encoding="utf-8")
-    path = os.pathsep.join([str(Path(__file__).parents[1]), str(Path(__file__).parent)])
+    places = [str(Path(__file__).parents[1]), str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")]
     as_root = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
     ran = subprocess.run(
         [mpiexec, "-n", "2", sys.executable, "-m", "mpi4py.futures", str(script)],
-        env=os.environ | as_root | {"PYTHONPATH": path},
+        env=os.environ | as_root | {"PYTHONPATH": os.pathsep.join(filter(None, places))},
         capture_output=True,
         text=True,
         timeout=120,

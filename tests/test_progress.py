@@ -1,7 +1,10 @@
 """Progress is shown to somebody who watches, and to nobody else."""
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -73,6 +76,22 @@ def test_nothing_is_shown_on_request(monkeypatch: pytest.MonkeyPatch, capsys: py
     terminal(monkeypatch)
     list(progress([1, 2], "steps", show=False))
     assert capsys.readouterr().err == ""
+
+
+def test_the_switch_of_tqdm_is_left_to_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``TQDM_DISABLE`` is the default of an argument that is not given; False would overrule it."""
+    given: list[dict[str, Any]] = []
+
+    @contextmanager
+    def recorder(**options: Any) -> Iterator[None]:  # noqa: ANN401
+        given.append(options)
+        yield
+
+    monkeypatch.setattr("tqdm.tqdm", recorder)
+    for show in (True, False):
+        with progress_bar(3, "steps", show=show):
+            pass
+    assert ["disable" in options for options in given] == [False, True]
 
 
 def test_a_process_without_stderr_is_no_reason_to_fail(monkeypatch: pytest.MonkeyPatch) -> None:
