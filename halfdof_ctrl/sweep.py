@@ -20,7 +20,8 @@ from halfdof_ctrl.onecase import CaseError, CaseWork, Constant, FrequencyWork, Q
 from halfdof_ctrl.progress import progress_bar
 from halfdof_ctrl.response import checked_frequencies
 from halfdof_ctrl.sweepresult import Outcome, SweepResult, joined_cases, joined_frequencies
-from halfdof_ctrl.workers import Work, available_cores, work_through
+from halfdof_ctrl.threads import available_cores
+from halfdof_ctrl.workers import Work, work_through
 
 QUANTITIES = ("poles", "response")
 EVERY_CORE = -1  #: as many workers as cores

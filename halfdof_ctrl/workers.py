@@ -4,26 +4,23 @@ Items are handed over in chunks that take about `CHUNK_SECONDS`, measured as the
 not drowned by the way to the worker and back. A worker that dies loses nothing: what it may have been working on
 is done again alone, in halves, until either all is done or a single item has killed `ATTEMPTS` workers on its own.
 
-Every worker's linear algebra is held to its share of the cores, since threads of several processes that wait for
-each other on the same cores can be tens of times slower than one thread each.
+Linear algebra in a worker is held to its share of the cores (see `threads`).
 """
 
 import math
-import os
 import pickle
 import signal
 import sys
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import contextmanager
-from functools import lru_cache
+from contextlib import suppress
 from typing import Any, TypeAlias
 
 from halfdof_ctrl.errors import WorkerError
 from halfdof_ctrl.progress import silence
+from halfdof_ctrl.threads import available_cores, limited_threads
 
 Work: TypeAlias = Callable[[list[Any]], list[Any]]  #: gives one result for each item and raises nothing
 Store: TypeAlias = Callable[[int, Any], None]  #: takes the number of an item and its result or the error that it met
@@ -80,17 +77,13 @@ def work_through(
 
 def _work_here(work: Work, items: Sequence[Any], store: Store, *, even: bool) -> None:
     if even:  # all at once, which shows its own progress
-        _store_all(store, list(range(len(items))), work(list(items)))
+        for number, result in enumerate(work(list(items))):
+            store(number, result)
         return
     for number, item in enumerate(items):
         with silence():
             (result,) = work([item])
         store(number, result)
-
-
-def available_cores() -> int:
-    """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class _Waiting:
@@ -129,22 +122,25 @@ class _Waiting:
         """Have the items of a chunk done one by one, after the others."""
         self._single.extend(chunk)
 
-    def rest(self) -> Chunk:
-        """Give all that is left."""
-        return [*self._left, *self._single]
-
 
 class _Round:
     """Chunks on their way through one executor, as long as it lives."""
 
     def __init__(self, work: Work, items: Sequence[Any], store: Store, threads: int) -> None:
-        self.work, self.items, self.store, self.threads = work, items, store, threads
+        self._work, self._items, self._store, self._threads = work, items, store, threads
         self.running: dict[Future[Any], Chunk] = {}
+        self.stored: set[int] = set()
+
+    def store(self, chunk: Chunk, results: Sequence[Any]) -> None:
+        """Store the results of some items, or the errors that they met."""
+        for number, result in zip(chunk, results, strict=True):
+            self._store(number, result)
+            self.stored.add(number)
 
     def submit(self, executor: Executor, chunk: Chunk) -> None:
         """Hand a chunk over."""
-        items = [self.items[number] for number in chunk]
-        self.running[executor.submit(run_chunk, self.work, items, self.threads)] = chunk
+        items = [self._items[number] for number in chunk]
+        self.running[executor.submit(run_chunk, self._work, items, self._threads)] = chunk
 
     def run(self, executor: Executor, waiting: _Waiting, most: int) -> list[Chunk]:
         """Keep up to so many chunks on their way until all is done; give those that a broken executor has lost."""
@@ -170,13 +166,13 @@ class _Round:
             if error is None:
                 results, seconds = future.result()
                 waiting.took(chunk, seconds)
-                _store_all(self.store, chunk, results)
+                self.store(chunk, results)
             elif isinstance(error, BrokenExecutor):
                 lost.append(chunk)
             elif len(chunk) > 1:  # Dask gives up a chunk that has killed workers, guilty items and innocent ones
                 waiting.split(chunk)
             else:
-                self.store(chunk[0], error)
+                self.store(chunk, [error])
             del self.running[future]  # last, so that Ctrl-C before it loses nothing
         return lost
 
@@ -185,7 +181,13 @@ class _Round:
         for future in self.running:
             future.cancel()
         for future in [future for future in self.running if future.done() and _error_of(future) is None]:
-            _store_all(self.store, self.running.pop(future), future.result()[0])
+            self.store(self.running.pop(future), future.result()[0])
+
+    def give_up(self, error: BaseException) -> None:
+        """Have all fail that is not done yet."""
+        self.cancel()
+        rest = [number for number in range(len(self._items)) if number not in self.stored]
+        self.store(rest, [error] * len(rest))
 
 
 def run_chunk(work: Work, items: list[Any], threads: int) -> tuple[list[Any], float]:
@@ -196,75 +198,22 @@ def run_chunk(work: Work, items: list[Any], threads: int) -> tuple[list[Any], fl
     return results, time.perf_counter() - start
 
 
-class _Limit:
-    """How many chunks are at work in this process, and who keeps its threads down for all of them."""
-
-    lock = threading.Lock()
-    users = 0
-    keeper: "_Keeper"
-
-
-class _Keeper(threading.Thread):
-    """Holds the limit, since OpenBLAS with its own threads listens only to the thread that was first to set one."""
-
-    def __init__(self, most: int) -> None:
-        super().__init__(name="halfdof_ctrl thread limit", daemon=True)
-        self.controller = _thread_controller(len(sys.modules))
-        self.limits: dict[str, int] = {}
-        for library in self.controller.info():
-            prefix = library["prefix"]
-            self.limits[prefix] = min(self.limits.get(prefix, most), library["num_threads"])
-        self.is_set, self.is_over = threading.Event(), threading.Event()
-
-    def run(self) -> None:
-        """Set the limit, and undo it when it is over."""
-        with self.controller.limit(limits=self.limits):
-            self.is_set.set()
-            self.is_over.wait()
-
-
-@contextmanager
-def limited_threads(most: int) -> Iterator[None]:
-    """Hold the threads of BLAS and OpenMP in this process to a number; several threads may ask for it at a time."""
-    with _Limit.lock:
-        _Limit.users += 1
-        if _Limit.users == 1:
-            _Limit.keeper = _Keeper(most)
-            _Limit.keeper.start()
-            _Limit.keeper.is_set.wait()
-        keeper = _Limit.keeper
-    try:
-        with keeper.controller.limit(limits=keeper.limits):  # OpenMP asks every thread for its own limit
-            yield
-    finally:
-        with _Limit.lock:
-            _Limit.users -= 1
-            if _Limit.users == 0:
-                keeper.is_over.set()
-                keeper.join()
-
-
-@lru_cache(maxsize=1)
-def _thread_controller(modules: int) -> Any:  # noqa: ANN401, ARG001  # threadpoolctl has no types
-    """Look for the libraries with threads; again when there are more modules, which may have brought some."""
-    from threadpoolctl import ThreadpoolController  # noqa: PLC0415  # only workers need it
-
-    return ThreadpoolController()
-
-
 def _work_elsewhere(work: Work, items: Sequence[Any], store: Store, executor: Executor, *, even: bool) -> None:
-    """Use an executor that was given: when it breaks, what is left fails with its error."""
+    """Use an executor that was given: when it takes no more work, what is left fails with its error."""
     workers = _workers_of(executor)
     waiting, current = _Waiting(len(items), workers, even=even), _Round(work, items, store, threads=1)
     try:
-        lost = current.run(executor, waiting, most=2 * workers)
+        if current.run(executor, waiting, most=2 * workers) or waiting:
+            msg = "the executor broke: one of its workers died, and it takes no more work"
+            current.give_up(BrokenExecutor(msg))
+    except Exception as error:  # whatever an executor of others raises when it is given work
+        current.cancel()
+        if not current.stored:
+            raise
+        current.give_up(error)
     except BaseException:
         current.cancel()
         raise
-    if lost or waiting:
-        broken = BrokenExecutor("the executor broke: one of its workers died, and it takes no more work")
-        for chunk in [*lost, waiting.rest()]:
-            _store_all(store, chunk, [broken] * len(chunk))
 
 
 def _workers_of(executor: Executor) -> int:
@@ -290,6 +239,8 @@ def _work_in_processes(work: Work, items: Sequence[Any], store: Store, workers: 
             while suspects:
                 suspects.extendleft(_alone(pool, current, waiting, suspects.popleft()))
         pool.executor.shutdown()
+    except WorkerError as error:  # a machine that starts no more processes, for example
+        current.give_up(error)
     except BaseException:
         current.cancel()
         raise
@@ -300,16 +251,17 @@ def _work_in_processes(work: Work, items: Sequence[Any], store: Store, workers: 
 def _alone(pool: "_Pool", current: _Round, waiting: _Waiting, chunk: Chunk) -> list[Chunk]:
     """Do a chunk with nothing beside it; if its worker dies, give its halves, or fail the single item."""
     for _ in range(ATTEMPTS if len(chunk) == 1 else 1):
-        current.submit(pool.executor, chunk)
-        if not current.collect(wait(current.running).done, waiting):
-            return []
+        with suppress(BrokenExecutor):  # a process that died with nothing to do counts like one that died at work
+            current.submit(pool.executor, chunk)
+            if not current.collect(wait(current.running).done, waiting):
+                return []
         pool.restart()
     if len(chunk) == 1:
         msg = (
             f"the worker process died {ATTEMPTS} times, each time with this case alone at work in it: it crashed in "
             "compiled code, was out of memory, or was ended from outside. Run the case without workers to see where."
         )
-        current.store(chunk[0], LostWorkerError(msg))
+        current.store(chunk, [LostWorkerError(msg)])
         return []
     middle = len(chunk) // 2
     return [chunk[middle:], chunk[:middle]]  # as extendleft takes them
@@ -387,8 +339,3 @@ def _error_of(future: Future[Any]) -> BaseException | None:
         return future.exception()
     except CancelledError as error:
         return error
-
-
-def _store_all(store: Store, chunk: Chunk, results: Sequence[Any]) -> None:
-    for number, result in zip(chunk, results, strict=True):
-        store(number, result)

@@ -15,14 +15,14 @@ import hypothesis.strategies as st
 import numpy as np
 import pytest
 import sweepcases
-import threadpoolctl
 from hypothesis import given
 from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import hydromount, sweep
 from halfdof_ctrl.errors import FailedCasesWarning, SweepInterruptedError, WorkerError
 from halfdof_ctrl.onecase import CaseError
-from halfdof_ctrl.workers import ATTEMPTS, CHUNK_SECONDS, _Waiting, available_cores, limited_threads, work_through
+from halfdof_ctrl.threads import limited_threads
+from halfdof_ctrl.workers import ATTEMPTS, CHUNK_SECONDS, _Pool, _Waiting, work_through
 
 COUNT = 40
 START = "forkserver" if sys.platform == "linux" else "spawn"  #: the server that the sweep uses is there already
@@ -44,9 +44,13 @@ class Inline(Executor):
 
     def __init__(self) -> None:
         self.chunks: list[list[Any]] = []
+        self.patience = 1000
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **_: Any) -> Future[Any]:  # noqa: ANN401
         """Work here and now."""
+        if len(self.chunks) >= self.patience:
+            msg = "closed"
+            raise RuntimeError(msg)
         future: Future[Any] = Future()
         items = args[1]
         self.chunks.append(items)
@@ -95,6 +99,21 @@ def test_a_case_that_ends_each_process_fails_alone() -> None:
     assert [(failure.case, failure.kind) for failure in result.failures] == [((7,), "LostWorkerError")]
     assert f"died {ATTEMPTS} times" in result.failures[0].message
     assert_array_equal(np.asarray(result.values), np.where(np.arange(COUNT) == 7, np.nan, SQUARES))
+
+
+def test_a_machine_that_starts_no_more_processes_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The rest fails with that reason."""
+
+    def refuse(pool: _Pool) -> None:
+        pool.stop()
+        msg = "no more processes"
+        raise WorkerError(msg, function="end_process")
+
+    monkeypatch.setattr(_Pool, "restart", refuse)
+    with pytest.warns(FailedCasesWarning, match="WorkerError: no more processes"):
+        result = sweep(sweepcases.end_process, {"x": range(COUNT), "fatal": 7}, workers=1)
+    assert_array_equal(np.asarray(result.values)[:1], [0])
+    assert result.failures[-1].case == (COUNT - 1,)
 
 
 @pytest.mark.usefixtures("_ctrl_c")
@@ -170,6 +189,17 @@ def test_a_chunk_that_is_lost_as_a_whole_is_done_piece_by_piece() -> None:
     assert results == dict(enumerate(SQUARES.tolist()))
 
 
+def test_an_executor_that_takes_no_more_work_keeps_what_is_done() -> None:
+    """Whatever it raises; where nothing is done at all, the error comes through."""
+    executor = Inline()
+    executor.patience = 3
+    with pytest.warns(FailedCasesWarning, match="37 of 40 cases failed, first x = 3: RuntimeError: closed"):
+        result = sweep(sweepcases.square, {"x": range(COUNT)}, executor=executor)
+    assert_array_equal(np.asarray(result.values)[:3], SQUARES[:3])
+    with pytest.raises(RuntimeError, match="closed"):
+        sweep(sweepcases.square, {"x": range(COUNT)}, executor=executor)
+
+
 def test_an_error_of_the_executor_is_that_of_the_case() -> None:
     """A function that a process pool cannot pickle fails case by case, with the reason."""
     with (
@@ -234,38 +264,6 @@ def test_even_chunks_are_a_few_for_each_worker() -> None:
     waiting = _Waiting(800, 2, even=True)
     assert [len(waiting.take()) for _ in range(8)] == [100] * 8
     assert not waiting
-
-
-# --- threads
-
-
-def thread_counts() -> list[int]:
-    """Give the number of threads of each library."""
-    return [library["num_threads"] for library in threadpoolctl.threadpool_info()]
-
-
-def test_workers_have_their_share_of_the_cores() -> None:
-    """Processes that are started here share the cores; in a given executor everybody has one thread."""
-    share = max(1, available_cores() // 2)
-    assert (np.asarray(sweep(sweepcases.threads, {"x": range(2)}, workers=2).values) <= share).all()
-    with ThreadPoolExecutor(2) as executor:
-        assert_array_equal(np.asarray(sweep(sweepcases.threads, {"x": range(4)}, executor=executor).values), 1)
-
-
-def test_threads_are_given_back_after_the_last_user() -> None:
-    """Two chunks at work in one process: the first that ends changes nothing for the other."""
-    before = thread_counts()
-    with limited_threads(1):
-        with limited_threads(1):
-            assert set(thread_counts()) == {1}
-        assert set(thread_counts()) == {1}
-    assert thread_counts() == before
-
-
-def test_a_limit_raises_nothing() -> None:
-    """Who allows one thread gets no more by a larger share."""
-    with threadpoolctl.threadpool_limits(1), limited_threads(64):
-        assert set(thread_counts()) == {1}
 
 
 def test_errors_keep_where_they_came_from() -> None:
