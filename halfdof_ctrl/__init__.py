@@ -12,6 +12,7 @@ from halfdof_ctrl.plots import (
     dynamic_stiffness_plot,
     pole_map_plot,
     step_plot,
+    sweep_plot,
     transmissibility_plot,
 )
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
@@ -19,6 +20,8 @@ from halfdof_ctrl.report import write_report
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.stiffness import dynamic_stiffness, transmissibility
+from halfdof_ctrl.sweep import sweep
+from halfdof_ctrl.sweepresult import SweepFailure, SweepResult
 
 __version__ = "0.1.0"
 
@@ -29,6 +32,8 @@ __all__ = [
     "PencilStructure",
     "SecondOrderModel",
     "StateFeedback",
+    "SweepFailure",
+    "SweepResult",
     "bode_plot",
     "crosscheck",
     "descriptor_response",
@@ -48,6 +53,8 @@ __all__ = [
     "save_response",
     "save_system",
     "step_plot",
+    "sweep",
+    "sweep_plot",
     "transmissibility",
     "transmissibility_plot",
     "write_report",

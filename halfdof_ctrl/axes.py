@@ -154,12 +154,13 @@ def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
     if not entries:
         return None
     lines = list(entries.values())
-    longest = max(len(str(line.get_label())) for line in lines) + 5
+    longest = max(len(str(line.get_label())) for line in lines) + 8
     for_figure = own or bool(ours)
     width = figure.bbox.width / figure.dpi * (1.0 if for_figure else axes[0, 0].get_position().width)
+    rows = -(-len(lines) // int(np.clip(LEGEND_CHARACTERS * width // longest, 1, len(lines))))
     style: dict[str, Any] = {
         "handles": lines,
-        "ncols": int(np.clip(LEGEND_CHARACTERS * width // longest, 1, len(lines))),
+        "ncols": -(-len(lines) // rows),
         "fontsize": LEGEND_SIZE,
         "frameon": False,
     }

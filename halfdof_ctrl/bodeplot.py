@@ -58,7 +58,7 @@ NO_STATE_SPACE: dict[type[HalfdofError], str] = {
 
 
 @dataclass(frozen=True, slots=True)
-class _Scales:
+class Scales:
     """What the axes are measured in."""
 
     dB: bool
@@ -66,13 +66,16 @@ class _Scales:
     deg: bool
 
     def frequency(self, omega: FloatArray) -> FloatArray:
+        """Give frequencies as they are drawn."""
         return omega / (2.0 * np.pi) if self.Hz else omega
 
     def magnitude(self, values: ComplexArray) -> FloatArray:
+        """Give magnitudes as they are drawn."""
         with np.errstate(divide="ignore"):
             return np.asarray(20.0 * np.log10(np.abs(values)) if self.dB else np.abs(values))
 
     def phase(self, angle: FloatArray) -> FloatArray:
+        """Give an angle [rad] as it is drawn."""
         return np.degrees(angle) if self.deg else angle
 
 
@@ -151,7 +154,7 @@ def bode_plot(
     p, m = curve.noutputs, curve.ninputs
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
-    lines, scales, prefix = no_lines(axes), _Scales(dB, Hz, deg), legend_prefix(label)
+    lines, scales, prefix = no_lines(axes), Scales(dB, Hz, deg), legend_prefix(label)
     values, marks = np.asarray(curve.frdata), _marked(curve)
     exact = (
         None
@@ -170,7 +173,7 @@ def bode_plot(
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
             lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(_on_branch(exact[i, j], phase[marks])), **style)
     named = sysdata if reference is None else reference
-    _dress(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
+    dress_bode(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 
@@ -265,12 +268,12 @@ def _on_branch(values: ComplexArray, phase: FloatArray) -> FloatArray:
     return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
 
 
-def _dress(
+def dress_bode(
     axes: AxesArray,
     curve: control.FrequencyResponseData,
     system: control.StateSpace | SecondOrderModel,
     units: dict[str, str],
-    scales: _Scales,
+    scales: Scales,
     *,
     grid: bool,
 ) -> None:

@@ -141,6 +141,22 @@ class FileFormatError(HalfdofError):
         self.path = path
 
 
+class WorkerError(HalfdofError):
+    """Worker processes cannot start or cannot load what they are to do; `function` is its name."""
+
+    def __init__(self, message: str, *, function: str) -> None:
+        super().__init__(message)
+        self.function = function
+
+
+class SweepInterruptedError(KeyboardInterrupt):
+    """A sweep was stopped by Ctrl-C; `result` is a `SweepResult` in which the cases that were not done have failed."""
+
+    def __init__(self, message: str, *, result: object) -> None:
+        super().__init__(message)
+        self.result = result
+
+
 def callers_level() -> int:
     """Give the `stacklevel` of a warning that is to point at the first line outside this package."""
     frame, level = sys._getframe(1), 1  # noqa: SLF001  # the way that the standard library goes too
@@ -159,3 +175,7 @@ class CloseDecisionWarning(UserWarning):
 
 class LostDigitsWarning(UserWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
+
+
+class FailedCasesWarning(UserWarning):
+    """Some cases of a sweep failed; its `failures` say which, and why."""

@@ -81,7 +81,7 @@ def pole_map_plot(
     discrete = isinstance(sysdata, control.StateSpace) and sysdata.isdtime(strict=True)
     if not plane.has_data():
         set_pole_axes(plane, np.concatenate([points for points, _, _ in marks]), discrete=discrete)
-        _draw_plane(plane, grid=grid, discrete=discrete)
+        draw_plane(plane, grid=grid, discrete=discrete)
     for points, text, style in marks:
         lines[0, 0] += plane.plot(points.real, points.imag, label=prefix + text, linestyle="none", **style)
         if style["marker"] == "x":
@@ -132,7 +132,7 @@ def _zeros_of(sys: control.StateSpace) -> ComplexArray:
     return finite_part(np.block([[A, B], [C, D]]), E).eigenvalues
 
 
-def _draw_plane(ax: Axes, *, grid: bool, discrete: bool) -> None:
+def draw_plane(ax: Axes, *, grid: bool, discrete: bool) -> None:
     """Draw what lies behind the markers, and label the axes."""
     boundary: dict[str, Any] = {"color": "0.35", "linewidth": 1.0, "zorder": 0.8}
     if discrete:

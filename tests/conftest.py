@@ -9,6 +9,8 @@ import sys
 
 from hypothesis import HealthCheck, settings
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers of pytest-xdist share the cores already
+
 if os.environ.get("HALFDOF_WITHOUT_SLYCOT", "0") not in {"", "0"}:
     if "control" in sys.modules or sys.modules.get("slycot") is not None:
         msg = "control or slycot was imported before tests/conftest.py could block slycot."

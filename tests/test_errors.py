@@ -23,6 +23,7 @@ from halfdof_ctrl.errors import (
     StabilizationError,
     UncertainRankError,
     WeightError,
+    WorkerError,
 )
 
 EXAMPLES: list[HalfdofError] = [
@@ -38,6 +39,7 @@ EXAMPLES: list[HalfdofError] = [
     WeightError("negative", names=("a",)),
     StabilizationError("unstable", eigenvalue=1 + 2j, quantity="a"),
     FileFormatError("truncated", path="model.npz"),
+    WorkerError("cannot start", function="hydromount"),
 ]
 
 
