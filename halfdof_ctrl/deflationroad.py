@@ -18,13 +18,14 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
-from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
+from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, StateEquations
 from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
 NOISE = 30.0  #: ... and below this times the error that was measured
+TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -89,8 +90,8 @@ class Deflated:
 
 def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
     """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    system, units = _scaled(model)
+    pencil = _scaled_pencil(model, system, units)
     return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
 
 
@@ -112,9 +113,8 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    P, B = np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba])
-    system, units = scaled_rows(P, B)
-    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    system, units = _scaled(model)
+    pencil = _scaled_pencil(model, system, units)
     decisions: tuple[BlockDecision, ...] = ()
     for caution in CAUTIONS:
         relaxation = relaxed(system, caution, tol)
@@ -129,6 +129,20 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     raise _uncertain_error(model, decisions)
 
 
+def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units]:
+    return scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+
+
+def _scaled_pencil(model: SecondOrderModel, system: RowSystem, units: Units) -> ScaledPencil:
+    speed = (units.time ** np.arange(3.0))[:, None, None]
+    return ScaledPencil(
+        P=system.matrix,
+        B=system.coefficients[:, :, system.size :],
+        F=np.stack([model.F, model.G, model.H]) * units.columns * speed,
+        D=np.stack([model.D, model.Dv, model.Da]) * speed,
+    )
+
+
 def _in_model_units(
     model: SecondOrderModel,
     relaxation: Relaxed,
@@ -138,7 +152,7 @@ def _in_model_units(
     pencil: ScaledPencil,
 ) -> Deflated:
     losses = pencil.losses(result.equations)
-    known_to = np.maximum(losses.size, NOISE / ROUNDING * losses.error)
+    known_to = np.maximum(losses.size, NOISE / ROUNDING * np.minimum(losses.error, TRUSTED * losses.size))
     return Deflated(
         selection=StateSelection(
             dofs=model.dofs,
