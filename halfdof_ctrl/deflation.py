@@ -129,9 +129,7 @@ def rounding_in_model_units(realization: Realization, units: Units, columns: Flo
     sizes = StateEquations(
         A=np.abs(scaled.A),
         B=np.maximum(np.abs(scaled.B), np.abs(scaled.B).max(axis=0, initial=0.0)),
-        displacement=Signal(
-            np.abs(q.X), tuple([np.maximum(np.abs(part), size) for part, size in zip(q.U, known, strict=False)])
-        ),
+        displacement=Signal(np.abs(q.X), sizes_of_inputs),
         shift=(),
     )
     result = in_model_units(replace(realization, equations=sizes), units)
