@@ -1,0 +1,99 @@
+"""Judgement of one reduction by exact rational arithmetic: what was asked of it and how far off it is.
+
+Everything is measured with plain numpy on the matrices that were returned; nothing here rounds but the comparison.
+"""
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from rational import RationalTransfer
+from scipy.optimize import linear_sum_assignment
+
+ComplexArray = npt.NDArray[np.complex128]
+FloatArray = npt.NDArray[np.float64]
+
+EPS = float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Improved:
+    """A state space and the polynomial that it lacks: ``C (sI - A)^-1 B + D + D_1 s + D_2 s^2 + ...``."""
+
+    A: FloatArray  #: (N, N)
+    B: FloatArray  #: (N, m)
+    C: FloatArray  #: (p, N)
+    D: FloatArray  #: (p, m)
+    polynomial: tuple[FloatArray, ...] = ()  #: (p, m) each
+
+    @classmethod
+    def of(cls, system: control.StateSpace, polynomial: tuple[FloatArray, ...] = ()) -> "Improved":
+        """Take the matrices of a system."""
+        A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (system.A, system.B, system.C, system.D))
+        return cls(A, B, C, D, polynomial)
+
+    def at(self, points: npt.ArrayLike) -> ComplexArray:
+        """Evaluate by a plain solve at each point: (p, m, k)."""
+        unit = np.eye(len(self.A))
+        values = [
+            self.C @ np.linalg.solve(s * unit - self.A, self.B)
+            + self.D
+            + sum(part * s**power for power, part in enumerate(self.polynomial, 1))
+            for s in np.atleast_1d(np.asarray(points))
+        ]
+        return np.stack(values, axis=2)
+
+
+def transfer_errors(actual: ComplexArray, desired: ComplexArray) -> FloatArray:
+    """Give at each of k points the largest error of (p, m, k) responses over the largest entry there."""
+    size = np.abs(desired).max(axis=(0, 1), initial=0.0)
+    error = np.abs(actual - desired).max(axis=(0, 1), initial=0.0)
+    return np.asarray(error / np.where(size > 0.0, size, 1.0))
+
+
+def overall_error(actual: ComplexArray, desired: ComplexArray) -> float:
+    """Give the largest error of (p, m, k) responses over the largest entry at any point."""
+    size = float(np.abs(desired).max(initial=0.0))
+    return float(np.abs(actual - desired).max(initial=0.0)) / (size if size > 0.0 else 1.0)
+
+
+def polynomial_error(actual: tuple[FloatArray, ...], desired: tuple[FloatArray, ...]) -> float:
+    """Give the largest error of the coefficients over the largest of the same power; inf if powers differ."""
+    if len(actual) != len(desired):
+        return float("inf")
+    errors = [np.abs(a - d).max() / np.abs(d).max() for a, d in zip(actual, desired, strict=True) if d.any()]
+    strays = [np.abs(a).max() for a, d in zip(actual, desired, strict=True) if not d.any()]
+    return float(max([*errors, *strays], default=0.0))
+
+
+def characteristic_error(A: FloatArray, exact: RationalTransfer, points: npt.ArrayLike) -> float:
+    """Compare ``det(sI - A)`` with the exact monic polynomial, relative to it; free of how eigenvalues cluster."""
+    signs, logs = exact.characteristic(points)
+    worst = 0.0
+    for s, sign, log in zip(np.atleast_1d(np.asarray(points)), signs, logs, strict=True):
+        found_sign, found_log = np.linalg.slogdet(s * np.eye(len(A)) - A)
+        with np.errstate(over="ignore"):
+            worst = max(worst, abs(found_sign * np.exp(found_log - log) / sign - 1.0))
+    return worst
+
+
+def eigenvalue_error(A: FloatArray, exact: RationalTransfer, floor: float = 1.0) -> float:
+    """Match eigenvalues with the certified ones; the worst error to the power of the multiplicity, over the scale.
+
+    An eigenvalue that occurs k times moves by the k-th root of a perturbation; its error is raised to the k-th power.
+    The scale is the spectral norm of the balanced A, the largest eigenvalue, or `floor` [rad/s] if that is larger.
+    """
+    values, times = exact.eigenvalues()
+    if len(A) != times.sum():
+        return float("inf")
+    if not len(A):
+        return 0.0
+    balanced = scipy.linalg.matrix_balance(A, permute=False)[0]
+    scale = max(float(np.linalg.norm(balanced, 2)), float(np.abs(values).max()), floor)
+    found = np.linalg.eigvals(balanced) / scale
+    wanted, powers = np.repeat(values, times) / scale, np.repeat(times, times)
+    distance = np.abs(found[:, None] - wanted)
+    rows, columns = linear_sum_assignment(distance)
+    return float((distance[rows, columns] ** powers[columns]).max())
