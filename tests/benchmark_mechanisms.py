@@ -39,7 +39,7 @@ def _triple_chain(n: int) -> tuple[FloatArray, FloatArray, FloatArray]:
     return M, C, K
 
 
-def triple_chain(n: int = 5, weights: tuple[float, float, float] = (-1.0, 2.0, -1.0)) -> SecondOrderModel:
+def triple_chain(n: int = 3, weights: tuple[float, float, float] = (-1.0, 2.0, -1.0)) -> SecondOrderModel:
     """Tie first, middle and last mass of each of three chains by a constraint: index 3.
 
     Source: N. Truhar, K. Veselic, An efficient method for estimating the optimal dampers' viscosity for linear
@@ -57,7 +57,7 @@ def triple_chain(n: int = 5, weights: tuple[float, float, float] = (-1.0, 2.0, -
 
 def triple_chain_by_means() -> SecondOrderModel:
     """Hold the mean of three masses of each chain of `triple_chain` (weights 1/3, which are no floats): index 3."""
-    return triple_chain(7, (1 / 3, 1 / 3, 1 / 3))
+    return triple_chain(3, (1 / 3, 1 / 3, 1 / 3))
 
 
 def car_and_pendulum(m1: float = 1.0, m2: float = 0.1, length: float = 0.5, g: float = 9.81) -> SecondOrderModel:

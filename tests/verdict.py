@@ -38,17 +38,28 @@ class Improved:
         """Evaluate by a plain solve at each point: (p, m, k)."""
         unit = np.eye(len(self.A))
         values = [
-            self.C @ np.linalg.solve(s * unit - self.A, self.B)
-            + self.D
-            + sum(part * s**power for power, part in enumerate(self.polynomial, 1))
-            for s in np.atleast_1d(np.asarray(points))
+            self.C @ np.linalg.solve(s * unit - self.A, self.B) + self.D for s in np.atleast_1d(np.asarray(points))
         ]
-        return np.stack(values, axis=2)
+        return np.stack(values, axis=2) + polynomial_at(self.polynomial, points, self.D.shape)
 
 
-def transfer_errors(actual: ComplexArray, desired: ComplexArray) -> FloatArray:
-    """Give at each of k points the largest error of (p, m, k) responses over the largest entry there."""
+def polynomial_at(parts: tuple[FloatArray, ...], points: npt.ArrayLike, shape: tuple[int, ...]) -> ComplexArray:
+    """Evaluate ``D_1 s + D_2 s^2 + ...``: (p, m, k)."""
+    s = np.atleast_1d(np.asarray(points, dtype=np.complex128))
+    value = np.zeros((*shape, s.size), dtype=np.complex128)
+    for power, part in enumerate(parts, 1):
+        value += part[:, :, None] * s**power
+    return value
+
+
+def transfer_errors(actual: ComplexArray, desired: ComplexArray, also: ComplexArray | None = None) -> FloatArray:
+    """Give at each of k points the largest error of (p, m, k) responses over the largest entry there.
+
+    Where H is a sum of which a part, `also`, is larger than itself, the error is taken over the largest of that part.
+    """
     size = np.abs(desired).max(axis=(0, 1), initial=0.0)
+    if also is not None:
+        size = np.maximum(size, np.abs(also).max(axis=(0, 1), initial=0.0))
     error = np.abs(actual - desired).max(axis=(0, 1), initial=0.0)
     return np.asarray(error / np.where(size > 0.0, size, 1.0))
 

@@ -1,8 +1,8 @@
 """Hunt for failures over thousands of random structures of any index, judged by exact arithmetic.
 
 Run ``python tests/benchmarks/hunt.py --cases 10000 --seed 1 --kind mixed`` from the project's folder. Each failure is
-printed with the seed that draws it again and, at the end, a table of counts and worst errors per kind. Smaller sizes
-are drawn again for each failing kind (``--shrink``) until a smallest failing model is found, which is printed.
+printed with the seed that draws it again (``--again mixed 5 2001247``); at the end come counts and worst errors per
+kind, and the smallest failing models as code. ``--largest 5`` hunts among small ones.
 """
 
 import argparse
@@ -20,10 +20,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import rational
 from anykinds import ANY_KIND, Kind, signals
 from structures import Structure
-from verdict import Improved, characteristic_error, eigenvalue_error, overall_error, polynomial_error, transfer_errors
+from verdict import (
+    Improved,
+    characteristic_error,
+    eigenvalue_error,
+    overall_error,
+    polynomial_at,
+    polynomial_error,
+    transfer_errors,
+)
 
 import halfdof_ctrl as hd
 from halfdof_ctrl.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.model import LETTERS
 
 POINTS = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
@@ -106,7 +115,8 @@ def _judge_channels(
     system = Improved.of(hd.mech2ss(reduction, improper="drop"), reduction.polynomial_part)
     finding.errors["polynomial"] = polynomial_error(reduction.polynomial_part, polynomial)
     near, exactly = system.at(POINTS), exact.at(POINTS)
-    finding.errors["transfer"] = float(transfer_errors(near, exactly).max())
+    also = polynomial_at(polynomial, POINTS, system.D.shape)
+    finding.errors["transfer"] = float(transfer_errors(near, exactly, also).max())
     proper = growth <= 0
     finding.errors["proper"] = float(transfer_errors(near[proper][None], exactly[proper][None]).max())
     finding.errors["far"] = overall_error(system.at(FAR)[proper], exact.at(FAR)[proper])
@@ -122,16 +132,10 @@ def drawn(kind: Kind, size: int, seed: int) -> tuple[Structure, hd.SecondOrderMo
 
 
 def shown(structure: Structure, model: hd.SecondOrderModel) -> str:
-    """Write a model as code."""
-    parts = [
-        f"{letter}={getattr(model, letter).astype(int).tolist()}" for letter in ("M", "C", "K", "B", "F", "G", "H")
-    ]
-    rest = [
-        f"{x}={getattr(model, x).astype(int).tolist()}"
-        for x in ("Bv", "Ba", "D", "Dv", "Da")
-        if getattr(model, x).any()
-    ]
-    return f"{structure.kind}: hd.mechss(" + ", ".join(parts[:6] + parts[6:] + rest) + ")"
+    """Write a model with integer entries as code."""
+    letters = [letter for letter in LETTERS if letter in "MCK" or getattr(model, letter).any()]
+    code = ", ".join(f"{letter}={getattr(model, letter).astype(int).tolist()}" for letter in letters)
+    return f"{structure.kind}: hd.mechss({code})"
 
 
 def main() -> None:
@@ -141,8 +145,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--largest", type=int, default=12)
     parser.add_argument("--kind", action="append", help="names of kinds, all by default")
+    parser.add_argument("--again", nargs=3, metavar=("KIND", "SIZE", "SEED"), help="judge one model again and show it")
     parser.add_argument("--shown", type=int, default=25, help="failures to be printed in full")
     options = parser.parse_args()
+    if options.again:
+        name, size, seed = options.again
+        structure, model = drawn(next(kind for kind in ANY_KIND if kind.__name__ == name), int(size), int(seed))
+        print(shown(structure, model), judged(structure, model), sep="\n")
+        return
     kinds = [kind for kind in ANY_KIND if options.kind is None or kind.__name__ in options.kind]
     counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
     worst: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
