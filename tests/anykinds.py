@@ -10,6 +10,7 @@ from typing import TypeAlias
 import numpy as np
 from hypothesis import strategies as st
 from structures import (
+    FloatArray,
     IntArray,
     Structure,
     assembled,
@@ -238,6 +239,15 @@ def signals(generator: np.random.Generator, structure: Structure) -> SecondOrder
         Dv=drawn((p, m), never),
         Da=drawn((p, m), never),
     )
+
+
+def in_units(model: SecondOrderModel, columns: FloatArray, rows: FloatArray, tau: float) -> SecondOrderModel:
+    """Measure DOFs, equations and time in other units; inputs and outputs stay what they are."""
+    P = [matrix * rows[:, None] * columns * tau**k for k, matrix in enumerate((model.K, model.C, model.M))]
+    B = [matrix * rows[:, None] * tau**k for k, matrix in enumerate((model.B, model.Bv, model.Ba))]
+    F = [matrix * columns * tau**k for k, matrix in enumerate((model.F, model.G, model.H))]
+    D = [matrix * tau**k for k, matrix in enumerate((model.D, model.Dv, model.Da))]
+    return mechss(P[2], P[1], P[0], B[0], *F[:2], H=F[2], D=D[0], Bv=B[1], Ba=B[2], Dv=D[1], Da=D[2])
 
 
 @st.composite

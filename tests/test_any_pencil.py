@@ -9,7 +9,17 @@ import warnings
 import numpy as np
 import numpy.typing as npt
 import pytest
-from anykinds import ANY_KIND, chain, combined, constrained, drawn_models, floating, holonomic, redundant
+from anykinds import (
+    ANY_KIND,
+    chain,
+    combined,
+    constrained,
+    drawn_models,
+    floating,
+    holonomic,
+    in_units,
+    redundant,
+)
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from rational import RationalTransfer, free_dofs, pencil_index, rational_transfer
@@ -24,7 +34,7 @@ from verdict import (
     transfer_errors,
 )
 
-from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss, mechss
+from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss
 from halfdof_ctrl.errors import ImproperError, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
@@ -210,17 +220,6 @@ def test_decimal_units_change_no_decision(
     assert found.states == reduction.states
     assert pairs(found) == pairs(reduction)
     assert errors(complete(found), exact, tau=tau).max() <= UNITS
-
-
-def in_units(
-    model: SecondOrderModel, columns: npt.NDArray[np.float64], rows: npt.NDArray[np.float64], tau: float
-) -> SecondOrderModel:
-    """Measure DOFs, equations and time in other units; inputs and outputs stay what they are."""
-    P = [matrix * rows[:, None] * columns * tau**k for k, matrix in enumerate((model.K, model.C, model.M))]
-    B = [matrix * rows[:, None] * tau**k for k, matrix in enumerate((model.B, model.Bv, model.Ba))]
-    F = [matrix * columns * tau**k for k, matrix in enumerate((model.F, model.G, model.H))]
-    D = [matrix * tau**k for k, matrix in enumerate((model.D, model.Dv, model.Da))]
-    return mechss(P[2], P[1], P[0], B[0], *F[:2], H=F[2], D=D[0], Bv=B[1], Ba=B[2], Dv=D[1], Da=D[2])
 
 
 def pairs(reduction: ExactReduction) -> set[tuple[int, int, int]]:

@@ -18,7 +18,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import rational
-from anykinds import ANY_KIND, Kind, signals
+from anykinds import ANY_KIND, Kind, in_units, signals
 from structures import Structure
 from verdict import (
     Improved,
@@ -57,8 +57,8 @@ class Finding:
     rcond: float = float("nan")
 
 
-def judged(structure: Structure, model: hd.SecondOrderModel) -> Finding:
-    """Reduce a model and compare everything that is promised with exact arithmetic."""
+def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
+    """Reduce a model whose unit of time is tau [s] and compare all that is promised with exact arithmetic."""
     finding = Finding()
     exact = rational.rational_transfer(model)
     try:
@@ -78,7 +78,7 @@ def judged(structure: Structure, model: hd.SecondOrderModel) -> Finding:
     finding.index = rational.pencil_index(*structure.matrices)
     if (reduction.index, reduction.n_infinite) != (finding.index, 2 * structure.size - exact.order):
         finding.complaints.append(f"index {reduction.index}, n_infinite {reduction.n_infinite}")
-    _judge_channels(finding, model, reduction, exact)
+    _judge_channels(finding, model, reduction, exact, tau)
     finding.complaints += [
         f"{what} error {error:.1e}" for what, error in finding.errors.items() if not error <= LIMITS[what]
     ]
@@ -98,7 +98,11 @@ def _judge_refusal(
 
 
 def _judge_channels(
-    finding: Finding, model: hd.SecondOrderModel, reduction: hd.ExactReduction, exact: rational.RationalTransfer
+    finding: Finding,
+    model: hd.SecondOrderModel,
+    reduction: hd.ExactReduction,
+    exact: rational.RationalTransfer,
+    tau: float,
 ) -> None:
     growth = exact.growth
     improper = tuple(
@@ -111,17 +115,17 @@ def _judge_channels(
         refused = refusal.pairs
     if set(refused) != set(improper):
         finding.complaints.append(f"improper pairs {refused}, exactly {improper}")
-    polynomial = exact.polynomial_part()
+    polynomial, points, roll_off = exact.polynomial_part(), POINTS / tau, FAR / tau
     system = Improved.of(hd.mech2ss(reduction, improper="drop"), reduction.polynomial_part)
     finding.errors["polynomial"] = polynomial_error(reduction.polynomial_part, polynomial)
-    near, exactly = system.at(POINTS), exact.at(POINTS)
-    also = polynomial_at(polynomial, POINTS, system.D.shape)
+    near, exactly = system.at(points), exact.at(points)
+    also = polynomial_at(polynomial, points, system.D.shape)
     finding.errors["transfer"] = float(transfer_errors(near, exactly, also).max())
     proper = growth <= 0
     finding.errors["proper"] = float(transfer_errors(near[proper][None], exactly[proper][None]).max())
-    finding.errors["far"] = overall_error(system.at(FAR)[proper], exact.at(FAR)[proper])
-    finding.errors["characteristic"] = characteristic_error(system.A, exact, POINTS)
-    finding.errors["eigenvalue"] = eigenvalue_error(system.A, exact)
+    finding.errors["far"] = overall_error(system.at(roll_off)[proper], exact.at(roll_off)[proper])
+    finding.errors["characteristic"] = characteristic_error(system.A, exact, points)
+    finding.errors["eigenvalue"] = eigenvalue_error(system.A, exact, floor=1.0 / tau)
 
 
 def drawn(kind: Kind, size: int, seed: int) -> tuple[Structure, hd.SecondOrderModel]:
@@ -129,6 +133,14 @@ def drawn(kind: Kind, size: int, seed: int) -> tuple[Structure, hd.SecondOrderMo
     generator = np.random.default_rng([seed, size])
     structure = kind(generator, size)
     return structure, signals(generator, structure)
+
+
+def rescaled(model: hd.SecondOrderModel, seed: int) -> tuple[hd.SecondOrderModel, float]:
+    """Give a model in random units of its DOFs, equations and time, powers of eight that round nothing."""
+    generator = np.random.default_rng([seed, 8])
+    columns, rows = 8.0 ** generator.integers(-9, 10, (2, len(model.dofs)))
+    tau = 8.0 ** int(generator.integers(-9, 10))
+    return in_units(model, columns, rows, tau), tau
 
 
 def shown(structure: Structure, model: hd.SecondOrderModel) -> str:
@@ -145,13 +157,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--largest", type=int, default=12)
     parser.add_argument("--kind", action="append", help="names of kinds, all by default")
+    parser.add_argument("--units", action="store_true", help="in random units")
     parser.add_argument("--again", nargs=3, metavar=("KIND", "SIZE", "SEED"), help="judge one model again and show it")
     parser.add_argument("--shown", type=int, default=25, help="failures to be printed in full")
     options = parser.parse_args()
     if options.again:
         name, size, seed = options.again
         structure, model = drawn(next(kind for kind in ANY_KIND if kind.__name__ == name), int(size), int(seed))
-        print(shown(structure, model), judged(structure, model), sep="\n")
+        scaled, tau = rescaled(model, int(seed)) if options.units else (model, 1.0)
+        print(shown(structure, model), judged(structure, scaled, tau), sep="\n")
         return
     kinds = [kind for kind in ANY_KIND if options.kind is None or kind.__name__ in options.kind]
     counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
@@ -163,7 +177,8 @@ def main() -> None:
         seed = options.seed * 1_000_000 + case
         size = int(np.random.default_rng(seed).integers(1, options.largest + 1))
         structure, model = drawn(kind, size, seed)
-        finding = judged(structure, model)
+        scaled, tau = rescaled(model, seed) if options.units else (model, 1.0)
+        finding = judged(structure, scaled, tau)
         row = kind.__name__
         counts[row]["cases"] += 1
         counts[row][finding.method] += 1
