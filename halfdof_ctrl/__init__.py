@@ -7,11 +7,18 @@ from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files import load_model, load_system, save_model, save_response, save_system
 from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.mounts import hydromount
-from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots import (
+    bode_plot,
+    dynamic_stiffness_plot,
+    pole_map_plot,
+    step_plot,
+    transmissibility_plot,
+)
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.report import write_report
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
+from halfdof_ctrl.stiffness import dynamic_stiffness, transmissibility
 
 __version__ = "0.1.0"
 
@@ -25,6 +32,8 @@ __all__ = [
     "bode_plot",
     "crosscheck",
     "descriptor_response",
+    "dynamic_stiffness",
+    "dynamic_stiffness_plot",
     "exact_reduction",
     "frequency_response",
     "hydromount",
@@ -39,6 +48,8 @@ __all__ = [
     "save_response",
     "save_system",
     "step_plot",
+    "transmissibility",
+    "transmissibility_plot",
     "write_report",
     "zeros",
 ]

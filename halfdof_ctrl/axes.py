@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 
 from halfdof_ctrl.errors import ParameterError
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import force_names, motion_names, name_from_label, unknown_name_error
+from halfdof_ctrl.names import force_names, motion_names, name_from_label, reaction_names, unknown_name_error
 
 AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
 AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
@@ -133,8 +133,9 @@ def label_y(ax: Axes, text: str) -> None:
 
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
     """Draw light grid lines, or none."""
+    style: dict[str, Any] = {"color": "0.85", "linewidth": 0.7} if on else {}  # matplotlib draws what has a style
     for ax in axes:
-        ax.grid(visible=on, which="major", color="0.85", linewidth=0.7)
+        ax.grid(visible=on, which="major", **style)
         ax.set_axisbelow(True)
 
 
@@ -200,12 +201,15 @@ def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> 
     known: dict[str, str | None] = {}
     if isinstance(system, SecondOrderModel):
         names: set[str] = {*system.inputs, *system.outputs}
+        dofs = tuple(dict.fromkeys((*system.dofs, *system.prescribed)))
         for dof, *motions, force in zip(
-            system.dofs, *(motion_names(system.dofs, k) for k in range(3)), force_names(system.dofs), strict=True
+            dofs, *(motion_names(dofs, k) for k in range(3)), force_names(dofs), strict=True
         ):
             unit = given.get(dof, "m")
             known |= dict(zip(motions, (unit, f"{unit}/s", f"{unit}/s^2"), strict=True))
             known[force] = FORCE_UNITS.get(unit)
+            if dof in system.prescribed:
+                known[reaction_names((dof,))[0]] = FORCE_UNITS.get(unit)
     else:
         names = {name for side in signal_names(system) for name in side}
     for name in given:
@@ -239,16 +243,24 @@ def ratio_label(output: str, source: str, units: Mapping[str, str], *, dB: bool,
     >>> ratio_label("y_dot", "F_y", {"y_dot": "m/s", "F_y": "N"}, dB=False, newline=False)
     '|y_dot/F_y| [(m/s)/N]'
     """
-    name = f"|{plain(output)}/{plain(source)}|"
-    unit = ""
-    if output in units and source in units:
-        over, under = units[output], units[source]
-        over = f"({over})" if set(over) & set("/ ") else over
-        under = f"({under})" if set(under) & set("/ ") else under
-        unit = "-" if over == under else f"{over}/{under}"
+    unit = ratio_unit(output, source, units)
     if dB:
         unit = f"dB re 1 {unit}" if unit not in {"", "-"} else "dB"
-    return name + (("\n" if newline else " ") + f"[{typeset(unit)}]" if unit else "")
+    return f"|{plain(output)}/{plain(source)}|" + (("\n" if newline else " ") + f"[{unit}]" if unit else "")
+
+
+def ratio_unit(output: str, source: str, units: Mapping[str, str]) -> str:
+    """Write the unit of a ratio of two signals, as far as it is known.
+
+    >>> ratio_unit("F_phi", "phi", {"F_phi": "N m", "phi": "rad"})
+    '(N m)/rad'
+    """
+    if output not in units or source not in units:
+        return ""
+    over, under = units[output], units[source]
+    over = f"({over})" if set(over) & set("/ ") else over
+    under = f"({under})" if set(under) & set("/ ") else under
+    return "-" if over == under else typeset(f"{over}/{under}")
 
 
 def plain(name: str) -> str:

@@ -34,7 +34,7 @@ from halfdof_ctrl.errors import (
     HalfdofError,
     ImproperError,
     ParameterError,
-    SingularLeadingMatrixError,
+    UncertainRankError,
 )
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.response import descriptor_response, frequency_response
@@ -53,7 +53,7 @@ SPIKE = 1e5  #: a peak higher than this times that range is cut
 NO_STATE_SPACE: dict[type[HalfdofError], str] = {
     ComplexModelError: "model is complex",
     ImproperError: "improper",
-    SingularLeadingMatrixError: "W is singular",
+    UncertainRankError: "order uncertain",
 }
 
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from halfdof_ctrl.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.errors import ImproperError, WeightError
 from halfdof_ctrl.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.partition import DofPartition
 from halfdof_ctrl.reduction import ExactReduction
 from halfdof_ctrl.statespace import mech2ss
 
@@ -94,6 +95,12 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
     """Give the rows and weights of the kinetic and the elastic energy."""
     model, part = reduction.model, reduction.partition
+    if model.prescribed:
+        msg = (
+            f"The motion of {listed(model.prescribed)} is prescribed, so that the mechanical energy is no function of "
+            "the states alone. Weight displacements and velocities instead."
+        )
+        raise WeightError(msg, names=("energy",))
     for letter, matrix in (("M", model.M), ("K", model.K)):
         if not _is_symmetric(matrix) or _smallest_eigenvalue(matrix) < -INDEFINITE:
             msg = (
@@ -105,7 +112,10 @@ def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatA
         msg = "The energy of a model on which derivatives of inputs act (Bv, Ba) is no function of its states alone."
         raise WeightError(msg, names=("energy",))
     n, m = reduction.B.shape
-    velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    if isinstance(part, DofPartition):  # only what has mass, whose velocity is a state
+        velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    else:
+        velocity = reduction.motion(1).X
     displacement = reduction.displacement
     return [
         (velocity, np.zeros((len(model.dofs), m)), 0.5 * weight * model.M),

@@ -26,12 +26,13 @@ from halfdof_ctrl.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.cost import Cost, Weights, given_cost, physical_cost
 from halfdof_ctrl.errors import StabilizationError, WeightError
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import listed, motion_names
+from halfdof_ctrl.names import force_names, listed, motion_names
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.spectrum import balanced, eigenvalues_and_rounding
 from halfdof_ctrl.statespace import labelled_system, mech2ss
 
 UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
+DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
 MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
 
 
@@ -74,14 +75,20 @@ class StateFeedback:
                 "Ba): the closed loop is no second-order model of the same form. Use `closed_loop`."
             )
             raise WeightError(msg, names=self.inputs)
-        from_q, from_v = _state_from_motion(self.reduction)
         model, K = self.model, self.K
+        gains = [K @ state_map for state_map in self.reduction.partition.state_maps()]  # on q, q' and, rarely, q''
+        if len(gains) > DERIVATIVES:
+            msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
+            raise WeightError(msg, names=self.states)
+        on_q, on_v, on_a = (*gains, np.zeros_like(gains[0]))[:DERIVATIVES]
         return replace(
             model,
-            C=read_only(model.C + model.B @ K @ from_v),
-            K=read_only(model.K + model.B @ K @ from_q),
-            F=read_only(model.F - model.D @ K @ from_q),
-            G=read_only(model.G - model.D @ K @ from_v),
+            M=read_only(model.M + model.B @ on_a),
+            C=read_only(model.C + model.B @ on_v),
+            K=read_only(model.K + model.B @ on_q),
+            F=read_only(model.F - model.D @ on_q),
+            G=read_only(model.G - model.D @ on_v),
+            H=read_only(model.H - model.D @ on_a),
             name=self.closed_loop.name,
         )
 
@@ -282,11 +289,8 @@ def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexAr
 
 def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
     """Name the DOF whose force drives a left eigenvector most."""
-    partition = reduction.partition
-    driven = np.abs(
-        mode[partition.n_inertial : partition.n_inertial + partition.n_half] @ reduction.alpha
-        + mode[partition.n_inertial + partition.n_half :] @ reduction.gamma
-    )
+    every_force = exact_reduction(reduction.model.select(inputs=force_names(reduction.model.dofs)))
+    driven = np.abs(mode @ every_force.B)
     return reduction.model.dofs[int(np.argmax(driven))]
 
 
@@ -295,17 +299,6 @@ def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str,
     shares = [np.abs(reduction.motion(derivative).X @ mode) for derivative in range(2)]
     derivative = 0 if shares[0].max() > UNREACHED * shares[1].max() else 1
     return ("displacement", "velocity")[derivative], reduction.model.dofs[int(np.argmax(shares[derivative]))]
-
-
-def _state_from_motion(reduction: ExactReduction) -> tuple[FloatArray, FloatArray]:
-    """Give L_q and L_v of x = L_q q + L_v q'."""
-    part = reduction.partition
-    n_i, moving = part.n_inertial, part.n_inertial + part.n_half
-    to_coordinates = part.to_coordinates(np.eye(len(reduction.model.dofs)))
-    from_q, from_v = np.zeros((2, reduction.order, to_coordinates.shape[1]))
-    from_q[:moving] = to_coordinates[:moving]
-    from_v[moving:] = to_coordinates[:n_i]
-    return from_q, from_v
 
 
 def _eigenvalues(A: FloatArray) -> ComplexArray:

@@ -77,6 +77,18 @@ class SingularPencilError(HalfdofError):
         self.dofs = dofs
 
 
+class UncertainRankError(HalfdofError):
+    """The order of the model cannot be told to working precision.
+
+    `dofs` take part in the closest decision about a rank, `gap` is the ratio of the singular values there.
+    """
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...], gap: float) -> None:
+        super().__init__(message)
+        self.dofs = dofs
+        self.gap = gap
+
+
 class ImproperError(HalfdofError):
     """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
 
@@ -139,3 +151,11 @@ def callers_level() -> int:
 
 class NearlyMasslessWarning(UserWarning):
     """A DOF has a mass so small against the others that its two states cost digits."""
+
+
+class CloseDecisionWarning(UserWarning):
+    """A decision about a rank is close: a smaller tolerance or another rounding would give another order."""
+
+
+class LostDigitsWarning(UserWarning):
+    """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.arrays import ComplexArray, Matrix, powers_of_two
 
@@ -35,7 +36,7 @@ def quadratic_transfer(
         ``inf + nan j`` in every entry where ``P(s)`` is exactly singular.
     """
     values = np.empty((*D[0].shape, points.size), dtype=np.complex128)
-    batch = max(1, BATCH_ENTRIES // P[0].size)
+    batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
     for start in range(0, points.size, batch):
         part = points[start : start + batch]
         with np.errstate(invalid="ignore", over="ignore"):
@@ -44,6 +45,31 @@ def quadratic_transfer(
         response[~np.isfinite(states).all(axis=(1, 2))] = complex(np.inf, np.nan)
         values[:, :, start : start + batch] = np.moveaxis(response, 0, 2)
     return values
+
+
+def checked_points(s: npt.ArrayLike) -> ComplexArray:
+    """Read points of the complex plane [rad/s], a number or a 1D array of them.
+
+    Raises
+    ------
+    ValueError
+        More dimensions.
+    """
+    points = np.asarray(s, dtype=np.complex128)
+    if points.ndim > 1:
+        msg = f"s must be a number or a 1D array, but it has {points.ndim} dimensions."
+        raise ValueError(msg)
+    return points
+
+
+def squeezed(values: ComplexArray, *, scalar: bool, squeeze: bool | None) -> ComplexArray:
+    """Drop axes of a (p, m, k) response as python-control does."""
+    if squeeze is None:
+        squeeze = values.shape[:2] == (1, 1)
+        values = values[0, 0] if squeeze else values
+        return values[..., 0] if scalar else values
+    values = values[..., 0] if scalar else values
+    return values.squeeze() if squeeze else values
 
 
 def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArray:

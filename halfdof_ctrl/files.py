@@ -2,7 +2,7 @@
 
 | what | endings | content |
 |---|---|---|
-| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da if there), dofs, inputs, outputs, name |
+| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed if there), dofs, inputs, outputs, name |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
 | response | .csv | one row a frequency or time, see `save_response` |
@@ -19,6 +19,7 @@ import warnings
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO, TypeAlias
 
@@ -74,7 +75,8 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or getattr(model, letter).any()]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
-    _save_matrices(path, content, {key: getattr(model, key) for key in MODEL_NAMES}, model.name)
+    names = {key: getattr(model, key) for key in MODEL_NAMES}
+    _save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
 
 
 def load_model(path: PathLike) -> SecondOrderModel:
@@ -84,8 +86,8 @@ def load_model(path: PathLike) -> SecondOrderModel:
     ----------
     path : path-like
         An ``.npz`` or MATLAB version 5 ``.mat`` file with K, and any of M, C, B, F, G, H, D, Bv, Ba, Dv, Da
-        (dense or sparse in ``.mat``), ``dofs``, ``inputs``, ``outputs`` (text arrays; in ``.mat`` cell or char
-        arrays) and ``name``. What is missing is as in `mechss`; other variables are not looked at.
+        (dense or sparse in ``.mat``), ``dofs``, ``inputs``, ``outputs``, ``prescribed`` (text arrays; in ``.mat``
+        cell or char arrays) and ``name``. What is missing is as in `mechss`; other variables are not looked at.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def load_model(path: PathLike) -> SecondOrderModel:
     OSError
         The file is not there or cannot be read.
     """
-    content = _load_matrices(path, (*LETTERS, *MODEL_NAMES, "name"))
+    content = _load_matrices(path, (*LETTERS, *MODEL_NAMES, "prescribed", "name"))
     if "K" not in content:
         found = f"it has {listed(sorted(content))}" if content else "it has none of a model's letters"
         msg = f"{path}: no stiffness K in the file ({found}). A model file holds M, C and K, capital letters."
@@ -107,7 +109,19 @@ def load_model(path: PathLike) -> SecondOrderModel:
     with _naming_the_file(path):
         matrices: dict[str, Any] = {letter: content.get(letter) for letter in LETTERS}
         names: dict[str, Any] = {key: _texts(content, key) for key in MODEL_NAMES}
-        return mechss(**matrices, **names, name=_single_text(content))
+        prescribed = _texts(content, "prescribed")
+        if not prescribed:
+            return mechss(**matrices, **names, name=_single_text(content))
+        return _with_prescribed(mechss(**matrices, dofs=names["dofs"], name=_single_text(content)), names, prescribed)
+
+
+def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescribed: Sequence[str]) -> SecondOrderModel:
+    """Name the signals of a model in which the force on a DOF or its motion may be a direct term."""
+    signals: dict[str, Any] = {
+        key: getattr(model, key) if names[key] is None else checked_names(names[key], len(getattr(model, key)), key)
+        for key in ("inputs", "outputs")
+    }
+    return replace(model, **signals, prescribed=checked_names(prescribed, len(prescribed), "prescribed DOFs"))
 
 
 def save_system(sys: control.StateSpace, path: PathLike) -> None:

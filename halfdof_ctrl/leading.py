@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange
 
 from halfdof_ctrl.arrays import FloatArray
@@ -43,6 +44,11 @@ class LeadingMatrix:
     def is_singular(self) -> bool:
         """Whether W is singular to working precision: rcond below n eps."""
         return self.rcond < len(self.factors) * SINGULAR
+
+    def singular_values(self) -> FloatArray:
+        """Give the singular values of the matrix that was factorized."""
+        L, U = np.tril(self.factors, -1) + np.eye(len(self.factors)), np.triu(self.factors)
+        return np.asarray(scipy.linalg.svdvals(L @ U))
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""

@@ -11,7 +11,7 @@ it has checked is not checked again. Derivation of all that follows: docs/explan
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,19 +27,19 @@ from halfdof_ctrl.arrays import (
     unit_matrix,
     zero_matrix,
 )
-from halfdof_ctrl.errors import SignalNameError
-from halfdof_ctrl.evaluation import quadratic_transfer
+from halfdof_ctrl.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
+from halfdof_ctrl.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 from halfdof_ctrl.names import (
+    Names,
+    as_tuple,
     checked_dofs,
-    checked_names,
     force_names,
     listed,
     motion_names,
     motions,
-    unknown_name_error,
+    picked_places,
+    reconciled_names,
 )
-
-Names: TypeAlias = str | Sequence[str] | None
 
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
 LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
@@ -69,6 +69,7 @@ class SecondOrderModel:
     inputs: tuple[str, ...]  #: names of the m inputs
     outputs: tuple[str, ...]  #: names of the p outputs
     name: str | None = None  #: name of the model, which the state space takes over
+    prescribed: tuple[str, ...] = ()  #: DOFs, here or removed, whose motion is an input (see `prescribe_motion`)
 
     @property
     def is_complex(self) -> bool:
@@ -107,18 +108,9 @@ class SecondOrderModel:
         >>> complex(mechss([[1]], [[0]], [[4]], [[2]])(0))
         (0.5+0j)
         """
-        points = np.asarray(s, dtype=np.complex128)
-        if points.ndim > 1:
-            msg = f"s must be a number or a 1D array, but it has {points.ndim} dimensions."
-            raise ValueError(msg)
-        values = quadratic_transfer(
-            (self.K, self.C, self.M),
-            (self.B, self.Bv, self.Ba),
-            (self.F, self.G, self.H),
-            (self.D, self.Dv, self.Da),
-            points.reshape(-1),
-        )
-        return _squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)
+        points = checked_points(s)
+        values = quadratic_transfer(*_coefficients(self), points.reshape(-1))
+        return squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)
 
     def select(self, inputs: Names = None, outputs: Names = None) -> "SecondOrderModel":
         """Give the model with other inputs and outputs, picked by name.
@@ -139,15 +131,69 @@ class SecondOrderModel:
         model = self if inputs is None else _with_inputs(self, inputs)
         return model if outputs is None else _with_outputs(model, outputs)
 
+    def prescribe_motion(
+        self, dof: Names, kind: MotionKind = "displacement", *, inputs: Names = None, outputs: Names = None
+    ) -> "SecondOrderModel":
+        """Make the motion of DOFs an input and the force that it takes an output (base excitation).
+
+        Parameters
+        ----------
+        dof : str or sequence of str
+            DOFs whose motion is prescribed.
+        kind : {"displacement", "velocity", "acceleration"}
+            What the input is, named ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``. With displacements the DOFs leave
+            the model; else they stay, with the equation ``q' = u`` or ``q'' = u`` in place of their own.
+        inputs, outputs : str or sequence of str, optional
+            All signals of the new model, in order: the new ones (motions, reactions ``R_<dof>``) and whatever
+            `select` finds in this model, motions of `dof` itself among them. By default the new ones alone,
+            behind what `select` could not bring back later: inputs that are no forces on DOFs (motions
+            prescribed before) and outputs that are no motions. Inputs that are left out are zero.
+
+        Returns
+        -------
+        SecondOrderModel
+            ``R_<dof>`` is the force on the DOF that must act besides those of the other inputs.
+
+        Raises
+        ------
+        SignalNameError
+            A DOF that is unknown, named twice or prescribed already; no DOF left; an unknown or taken name.
+        ParameterError
+            `kind` is none of the three.
+
+        Examples
+        --------
+        The foot of a spring of 8 N/m under 2 kg: at s = 1 the mass follows by 8 / (2 + 8), and it takes 1.6 N/m.
+
+        >>> model = mechss([[2, 0], [0, 0]], None, [[8, -8], [-8, 8]], dofs=["mass", "foot"])
+        >>> model.prescribe_motion("foot", outputs=["mass", "R_foot"])(1.0).real.round(12).tolist()
+        [[0.8], [1.6]]
+        """
+        new = prescribed_signals(self, dof, kind, inputs, outputs)
+        base = self.select(new.old_inputs or self.inputs[:1], new.old_outputs or self.outputs[:1])
+        P, B, F, D = with_motion_as_input(*_coefficients(base), new.driven, new.derivative)
+        letters = ("K", "C", "M", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
+        matrices: dict[str, Any] = dict(zip(letters, map(read_only, (*P, *B, *F, *D)), strict=True))
+        model = replace(
+            base,
+            **matrices,
+            dofs=tuple([name for name in self.dofs if new.derivative or name not in new.names]),
+            inputs=(*base.inputs, *new.motions),
+            outputs=(*base.outputs, *new.reactions),
+            prescribed=(*self.prescribed, *new.names),
+        )
+        return model.select(new.inputs, new.outputs)
+
     def __repr__(self) -> str:
         """Give the model on four lines: what it is called, how its DOFs split, its signals."""
         title = f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
         complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
+        prescribed_part = f"\n  motion prescribed: {listed(self.prescribed)}" if self.prescribed else ""
         return (
             f"{title}: {len(self.dofs)} DOFs: {_split_in_words(self.M, self.C, self.K)}\n"
             f"  dofs:    {listed(self.dofs)}\n"
             f"  inputs:  {listed(self.inputs)}\n"
-            f"  outputs: {listed(self.outputs)}{complex_part}"
+            f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}"
         )
 
 
@@ -284,7 +330,7 @@ def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...])
     forces = force_names(dofs)
     meaning = [_unit_vectors([matrix[:, j] for matrix in columns]) for j in range(columns[0].shape[1])]
     found = [forces[hit[1]] if hit is not None and hit[0] == 0 else None for hit in meaning]
-    return _reconciled(given, found, forces, ("inputs", "u", "the unit force on a DOF", "B"))
+    return reconciled_names(given, found, forces, ("inputs", "u", "the unit force on a DOF", "B"))
 
 
 def _output_names(
@@ -297,7 +343,7 @@ def _output_names(
         hit = _unit_vectors([matrix[i] for matrix in rows])
         fed = any(matrix[i].any() for matrix in direct)
         found.append(None if hit is None or fed else names[hit[0]][hit[1]])
-    return _reconciled(given, found, tuple(motions(dofs)), ("outputs", "y", "a DOF's motion", "F, G, H"))
+    return reconciled_names(given, found, tuple(motions(dofs)), ("outputs", "y", "a DOF's motion", "F, G, H"))
 
 
 def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
@@ -308,35 +354,19 @@ def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
     return None
 
 
-def _reconciled(
-    given: Names, found: Sequence[str | None], physical: tuple[str, ...], words: tuple[str, str, str, str]
-) -> tuple[str, ...]:
-    """Take the given names, or the found ones, and refuse a physical name on another signal."""
-    what, letter, meaning, matrices = words
-    if given is None:
-        physical_found = [name for name in found if name is not None]
-        once = len(set(physical_found)) == len(physical_found)
-        return tuple([name if name and once else f"{letter}[{i}]" for i, name in enumerate(found)])
-    names = checked_names(given, len(found), what)
-    reserved = set(physical)
-    wrong = tuple(
-        [name for name, by_matrix in zip(names, found, strict=True) if name in reserved and name != by_matrix]
-    )
-    if wrong:
-        msg = (
-            f"Among the {what}, {listed(wrong)} is the name of {meaning}, but {matrices} say something else. "
-            "Rename it, or take the physical signal by select()."
-        )
-        raise SignalNameError(msg, names=wrong)
-    return names
+def _coefficients(model: SecondOrderModel) -> tuple[Coefficients, Coefficients, Coefficients, Coefficients]:
+    """Give the coefficients of 1, s, s^2 in P, B, F and D of equation (1)."""
+    P, B, F = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
+    return P, B, F, (model.D, model.Dv, model.Da)
 
 
 def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
-    picked = _picked(names, model.inputs, force_names(model.dofs), "input")
+    require_free(names, model.inputs, model.prescribed)
+    picked = picked_places(names, model.inputs, force_names(model.dofs), "input")
     unit, no_force, no_feed = unit_matrix(model.M.shape[0]), zero_matrix(*model.M.shape), zero_matrix(*model.F.shape)
     return replace(
         model,
-        inputs=_as_tuple(names),
+        inputs=as_tuple(names),
         B=read_only(np.hstack([model.B, unit])[:, picked]),
         Bv=read_only(np.hstack([model.Bv, no_force])[:, picked]),
         Ba=read_only(np.hstack([model.Ba, no_force])[:, picked]),
@@ -347,12 +377,12 @@ def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
 
 
 def _with_outputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
-    picked = _picked(names, model.outputs, tuple(motions(model.dofs)), "output")
+    picked = picked_places(names, model.outputs, tuple(motions(model.dofs)), "output")
     n, m = model.M.shape[0], model.B.shape[1]
     unit, no_motion, no_feed = unit_matrix(n), zero_matrix(n, n), zero_matrix(3 * n, m)
     return replace(
         model,
-        outputs=_as_tuple(names),
+        outputs=as_tuple(names),
         F=read_only(np.vstack([model.F, unit, no_motion, no_motion])[picked]),
         G=read_only(np.vstack([model.G, no_motion, unit, no_motion])[picked]),
         H=read_only(np.vstack([model.H, no_motion, no_motion, unit])[picked]),
@@ -360,35 +390,6 @@ def _with_outputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
         Dv=read_only(np.vstack([model.Dv, no_feed])[picked]),
         Da=read_only(np.vstack([model.Da, no_feed])[picked]),
     )
-
-
-def _as_tuple(names: Names) -> tuple[str, ...]:
-    return (names,) if isinstance(names, str) else tuple(names or ())
-
-
-def _picked(names: Names, own: tuple[str, ...], physical: tuple[str, ...], what: str) -> list[int]:
-    """Give the positions of names in the model's own signals followed by the physical ones."""
-    wanted = _as_tuple(names)
-    if not wanted:
-        msg = f"No {what} is selected: a model needs at least one."
-        raise SignalNameError(msg, names=())
-    checked_names(wanted, len(wanted), f"{what}s")
-    places = {name: len(own) + index for index, name in enumerate(physical)}
-    places.update({name: index for index, name in enumerate(own)})
-    for name in wanted:
-        if name not in places:
-            raise unknown_name_error(name, what, dict.fromkeys((*own, *physical)))
-    return [places[name] for name in wanted]
-
-
-def _squeezed(values: ComplexArray, *, scalar: bool, squeeze: bool | None) -> ComplexArray:
-    """Drop axes of a (p, m, k) response as python-control does."""
-    if squeeze is None:
-        squeeze = values.shape[:2] == (1, 1)
-        values = values[0, 0] if squeeze else values
-        return values[..., 0] if scalar else values
-    values = values[..., 0] if scalar else values
-    return values.squeeze() if squeeze else values
 
 
 def _split_in_words(M: Matrix, C: Matrix, K: Matrix) -> str:

@@ -16,7 +16,7 @@ def hydromount(
     C_rs: float = 100.0,
     C_h: float = 300.0,
 ) -> SecondOrderModel:
-    """Model a hydroelastic engine mount that carries a mass.
+    """Model a hydroelastic engine mount and the mass that it carries.
 
     DOF ``y`` is the mass on top, ``y1`` the node between the damper C_rs and the spring K_rs of the
     rubber, ``y2`` the node between the oil's spring K_v and the lower chamber. ``y1`` and ``y2`` have no
@@ -25,7 +25,8 @@ def hydromount(
     Parameters
     ----------
     m : float
-        Mass on the mount [kg], positive.
+        Mass on the mount [kg]. With 0 the mount stands alone, as on a test rig: three half DOFs that make two
+        states, since y and y1 are damped against each other only.
     K_r : float
         Stiffness of the primary rubber [N/m].
     K_rs, C_rs : float
@@ -45,7 +46,7 @@ def hydromount(
     Raises
     ------
     ParameterError
-        A mass that is not positive, a negative stiffness or damping, NaN or Inf.
+        A negative mass, stiffness or damping, NaN or Inf.
 
     Notes
     -----
@@ -58,8 +59,8 @@ def hydromount(
     >>> hydromount().K.tolist()
     [[5500.0, 0.0, -500.0], [0.0, 1000.0, 0.0], [-500.0, 0.0, 1000.0]]
     """
-    if not (math.isfinite(m) and m > 0.0):
-        msg = f"m = {m} kg, but the mass on the mount must be positive: without it use m's DOF as a prescribed motion."
+    if not (math.isfinite(m) and m >= 0.0):
+        msg = f"m = {m} kg, but the mass on the mount must be a number that is not negative; 0 for the mount alone."
         raise ParameterError(msg, parameter="m", value=m)
     for symbol, value in (("K_r", K_r), ("K_rs", K_rs), ("K_v", K_v), ("K_s", K_s), ("C_rs", C_rs), ("C_h", C_h)):
         if not (math.isfinite(value) and value >= 0.0):

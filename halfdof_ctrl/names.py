@@ -1,18 +1,22 @@
 """Names of degrees of freedom (DOFs) and signals, and their way into python-control and back.
 
-For a DOF ``y`` the package knows the force ``F_y`` and the displacement, velocity and acceleration
-``y``, ``y_dot``, ``y_ddot``. python-control forbids the full stop in labels, which finite-element
-labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
+For a DOF ``y`` the package knows the force ``F_y``, the displacement, velocity and acceleration ``y``, ``y_dot``,
+``y_ddot``, and ``R_y``, the reaction where its motion is prescribed. python-control forbids the full stop in
+labels, which finite-element labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
 """
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from itertools import chain
+from typing import TypeAlias
 
 from halfdof_ctrl.errors import SignalNameError
 
+Names: TypeAlias = str | Sequence[str] | None
+
 DERIVATIVE_SUFFIXES = ("", "_dot", "_ddot")
 FORCE_PREFIX = "F_"
+REACTION_PREFIX = "R_"
 
 
 def control_label(name: str) -> str:
@@ -48,10 +52,29 @@ def motion_names(dofs: tuple[str, ...], derivative: int) -> tuple[str, ...]:
     return tuple([dof + suffix for dof in dofs])
 
 
+def derivative_name(dof: str, order: int, dofs: tuple[str, ...]) -> str:
+    """Name any derivative of a DOF's displacement, clear of the names of the other DOFs' motions.
+
+    >>> derivative_name("y", 3, ("y",))
+    'y_d3'
+    """
+    if order < len(DERIVATIVE_SUFFIXES):
+        return dof + DERIVATIVE_SUFFIXES[order]
+    name = f"{dof}_d{order}"
+    while name in motions(dofs):
+        name += "_"
+    return name
+
+
 @lru_cache(maxsize=256)
 def force_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
     """Names of the unit forces on the DOFs."""
     return tuple([FORCE_PREFIX + dof for dof in dofs])
+
+
+def reaction_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the forces that it takes to move the DOFs as prescribed."""
+    return tuple([REACTION_PREFIX + dof for dof in dofs])
 
 
 def motions(dofs: tuple[str, ...]) -> dict[str, tuple[int, int]]:
@@ -124,6 +147,61 @@ def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
         )
         raise SignalNameError(msg, names=clash)
     return dofs
+
+
+def as_tuple(names: Names) -> tuple[str, ...]:
+    """Read one name, several or none as a tuple."""
+    return (names,) if isinstance(names, str) else tuple(names or ())
+
+
+def reconciled_names(
+    given: Names, found: Sequence[str | None], physical: tuple[str, ...], words: tuple[str, str, str, str]
+) -> tuple[str, ...]:
+    """Take the given names, or the ones found by what signals are, and refuse a physical name on another signal.
+
+    Raises
+    ------
+    SignalNameError
+        As `checked_names`, or a name of a force or motion on a signal that is something else.
+    """
+    what, letter, meaning, matrices = words
+    if given is None:
+        physical_found = [name for name in found if name is not None]
+        once = len(set(physical_found)) == len(physical_found)
+        return tuple([name if name and once else f"{letter}[{i}]" for i, name in enumerate(found)])
+    names = checked_names(given, len(found), what)
+    reserved = set(physical)
+    wrong = tuple(
+        [name for name, by_matrix in zip(names, found, strict=True) if name in reserved and name != by_matrix]
+    )
+    if wrong:
+        msg = (
+            f"Among the {what}, {listed(wrong)} is the name of {meaning}, but {matrices} say something else. "
+            "Rename it, or take the physical signal by select()."
+        )
+        raise SignalNameError(msg, names=wrong)
+    return names
+
+
+def picked_places(names: Names, own: tuple[str, ...], physical: tuple[str, ...], what: str) -> list[int]:
+    """Give the positions of names in a model's own signals followed by the physical ones.
+
+    Raises
+    ------
+    SignalNameError
+        No name, one that is unknown, or one that stands twice.
+    """
+    wanted = as_tuple(names)
+    if not wanted:
+        msg = f"No {what} is selected: a model needs at least one."
+        raise SignalNameError(msg, names=())
+    checked_names(wanted, len(wanted), f"{what}s")
+    places = {name: len(own) + index for index, name in enumerate(physical)}
+    places.update({name: index for index, name in enumerate(own)})
+    for name in wanted:
+        if name not in places:
+            raise unknown_name_error(name, what, dict.fromkeys((*own, *physical)))
+    return [places[name] for name in wanted]
 
 
 def unknown_name_error(name: str, what: str, known: Iterable[str]) -> SignalNameError:

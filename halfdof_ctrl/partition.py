@@ -24,7 +24,7 @@ from scipy.sparse.csgraph import connected_components
 from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix
 from halfdof_ctrl.errors import NearlyMasslessWarning, callers_level
 from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
-from halfdof_ctrl.names import listed
+from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.scaling import equilibrating_factors
 
 IndexArray: TypeAlias = npt.NDArray[np.intp]
@@ -37,20 +37,25 @@ PLAIN_SPREAD = 1e5  #: of stiffness over mass between the DOFs; a smaller one ne
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class RankDecision:
-    """The singular values by which one block of a matrix was split."""
+    """The singular values by which one block of a matrix was split or found nonsingular."""
 
-    matrix: Literal["M", "C"]  #: which null space was looked for
+    matrix: Literal["M", "C", "W", "J"]  #: whose block; W of equation (2), J of equation (16)
     dofs: tuple[str, ...]  #: the DOFs of the block
-    singular_values: FloatArray  #: of the equilibrated block, falling
+    singular_values: FloatArray  #: of the scaled block, falling
     rank: int  #: how many of them count
+    bound: float  #: those up to this one count as zero
 
     @property
     def gap(self) -> float:
-        """Smallest singular value that counts over the largest that does not (inf if none)."""
+        """Smallest singular value that counts over the largest that does not, or over the bound where all count.
+
+        inf where the others are exactly zero or none counts.
+        """
         values = self.singular_values
-        if self.rank in {0, values.size} or values[self.rank] == 0.0:
+        if self.rank == 0:
             return float("inf")
-        return float(values[self.rank - 1] / values[self.rank])
+        below = self.bound if self.rank == values.size else float(values[self.rank])
+        return float(values[self.rank - 1]) / below if below > 0.0 else float("inf")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -82,6 +87,29 @@ class DofPartition:
     def static(self) -> tuple[str, ...]:
         """Names of the coordinates with neither, p_k."""
         return self.coordinates[self.n_inertial + self.n_half :]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states: inertial and half displacements, then inertial velocities."""
+        return (*self.inertial, *self.half, *motion_names(self.inertial, 1))
+
+    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+        """Tell for each of the model's DOFs that is not wholly inertial whether it is half or static."""
+        moving = self.n_inertial + self.n_half
+        return {
+            dof: "half" if row[self.n_inertial : moving].any() else "static"
+            for dof, row in zip(dofs, self.T, strict=True)
+            if row[self.n_inertial :].any()
+        }
+
+    def state_maps(self) -> tuple[FloatArray, FloatArray]:
+        """Give L_q and L_v, (N, n) each, of x = L_q q + L_v q'."""
+        moving = self.n_inertial + self.n_half
+        to_coordinates = self.to_coordinates(unit_matrix(self.order.size))
+        from_q, from_v = np.zeros((2, moving + self.n_inertial, self.order.size))
+        from_q[:moving] = to_coordinates[:moving]
+        from_v[moving:] = to_coordinates[: self.n_inertial]
+        return from_q, from_v
 
     @property
     def T(self) -> FloatArray:  # noqa: N802
@@ -265,7 +293,11 @@ def _null_split(
         bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
         rank = int(np.count_nonzero(values > bound * values[0]))
         concerned = tuple([dofs[index] for index in np.flatnonzero(own.columns.any(axis=1)).tolist()])
-        evidence.append(RankDecision(matrix=letter, dofs=concerned, singular_values=values, rank=rank))
+        evidence.append(
+            RankDecision(
+                matrix=letter, dofs=concerned, singular_values=values, rank=rank, bound=float(bound * values[0])
+            )
+        )
         if rank == block.size:
             ranging.append(own)
             continue

@@ -12,7 +12,7 @@ from halfdof_ctrl.arrays import ComplexArray
 from halfdof_ctrl.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
 from halfdof_ctrl.descriptor import pencil_structure, zeros
 from halfdof_ctrl.design import StateFeedback
-from halfdof_ctrl.errors import ComplexModelError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.errors import ComplexModelError, ParameterError, UncertainRankError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.pencils import finite_part
 from halfdof_ctrl.polegrid import draw_pole_grid, mark_multiple, set_pole_axes
@@ -118,7 +118,7 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
         A = exact_reduction(model).A
-    except (ComplexModelError, SingularLeadingMatrixError):
+    except (ComplexModelError, UncertainRankError):
         return []
     poles = scipy.linalg.eigvals(A) if A.size else NONE
     return [(np.asarray(poles), f"poles of A{closed}", CROSS)]

@@ -14,27 +14,42 @@ Derivatives of the inputs (Bv, Ba) are absorbed by x = x~ + E_0 u + E_1 u' (5), 
 Derivation: docs/explanation/reduction.md.
 """
 
+import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
-from halfdof_ctrl.errors import ComplexModelError, InconsistentStateError, ParameterError, SingularLeadingMatrixError
-from halfdof_ctrl.leading import LeadingMatrix
+from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.deflationroad import StateSelection, deflated
+from halfdof_ctrl.errors import (
+    CloseDecisionWarning,
+    ComplexModelError,
+    InconsistentStateError,
+    LostDigitsWarning,
+    ParameterError,
+    SingularLeadingMatrixError,
+    callers_level,
+)
+from halfdof_ctrl.leading import SINGULAR, LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
-from halfdof_ctrl.partition import DofPartition, orthonormal_bases, select_columns
+from halfdof_ctrl.outputs import output_signal, without_rounding
+from halfdof_ctrl.partition import DofPartition, RankDecision, orthonormal_bases, select_columns
 from halfdof_ctrl.recovery import RecoveredMotion, TimeResponse, forward_slope, given_values, require_consistent
 from halfdof_ctrl.scaling import equilibrating_factors
-from halfdof_ctrl.signals import Signal, trimmed
+from halfdof_ctrl.signals import Rounding, Signal, StateEquations
+from halfdof_ctrl.singlesolve import leading_columns, rounding_of_solve, solved_at_once
 
-Road: TypeAlias = Literal["selection", "orthogonal"]
+Road: TypeAlias = Literal["selection", "orthogonal", "deflation"]
 
+ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
+CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
+LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -45,12 +60,31 @@ class ExactReduction:
     """
 
     model: SecondOrderModel  #: the model that was reduced
-    partition: DofPartition  #: which coordinates are inertial, half and static
-    leading: LeadingMatrix  #: W of equation (2), factorized
-    A: FloatArray  #: (N, N) of x = (p_i, p_c, p'_i)
-    B: FloatArray  #: (N, m)
-    displacement: Signal  #: all n displacements, equation (4)
-    shift: tuple[FloatArray, ...]  #: E_0, E_1 of equation (5), (N, m) each; empty unless Bv or Ba is there
+    partition: DofPartition | StateSelection  #: which coordinates are inertial, half and static
+    leading: LeadingMatrix | None  #: W of equation (2), factorized; None where the road is `deflation`
+    equations: StateEquations  #: A, B and the way back to q
+    rcond: float  #: reciprocal condition number of W, or the smallest of the systems (18), on which the states rest
+    known_rounding: Rounding | None = None  #: rounding errors of the equations, where the road has followed them
+
+    @property
+    def A(self) -> FloatArray:  # noqa: N802
+        """(N, N) state matrix."""
+        return self.equations.A
+
+    @property
+    def B(self) -> FloatArray:  # noqa: N802
+        """(N, m) input matrix."""
+        return self.equations.B
+
+    @property
+    def displacement(self) -> Signal:
+        """All n displacements as functions of state and inputs, equation (4)."""
+        return self.equations.displacement
+
+    @property
+    def shift(self) -> tuple[FloatArray, ...]:
+        """E_0, E_1, ... of equation (5), (N, m) each; empty unless derivatives of inputs reach the states."""
+        return self.equations.shift
 
     @property
     def order(self) -> int:
@@ -64,34 +98,66 @@ class ExactReduction:
 
     @property
     def index(self) -> int:
-        """Index of the first-order pencil in (p_i, p_c, p_k, p'_i): 1 with static coordinates, else 0."""
-        return int(self.partition.n_static > 0)
+        """Index of the first-order pencil (8): one more than the order of growth of its inverse, 0 if that vanishes.
 
-    @property
-    def rcond(self) -> float:
-        """Reciprocal condition number of W, on which the count of states rests (see `LeadingMatrix`)."""
-        return self.leading.rcond
+        Constraints of displacements give 3, of velocities 2.
+        """
+        if isinstance(self.partition, DofPartition):
+            return int(self.partition.n_static > 0)
+        return _index(self)
 
     @property
     def method(self) -> Road:
-        """Which road was taken: `selection` of DOFs or `orthogonal` bases."""
+        """Which road was taken: `selection` of DOFs, `orthogonal` bases or `deflation`."""
         return self.partition.method
 
     @property
+    def evidence(self) -> tuple[RankDecision, ...]:
+        """The singular values that decisions about ranks rest on, block by block; those of W come last."""
+        if self.leading is None or isinstance(self.partition, StateSelection):
+            return self.partition.evidence
+        values = self.leading.singular_values()
+        bound = len(values) * SINGULAR * float(values.max(initial=0.0))
+        regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
+        return (*self.partition.evidence, regular)
+
+    @property
+    def output(self) -> Signal:
+        """The model's outputs as functions of state, inputs and, where they are improper, derivatives of inputs."""
+        return output_signal(self.model, self.equations, self._rounding)
+
+    @property
+    def polynomial_part(self) -> tuple[FloatArray, ...]:
+        """D_1, D_2, ... of ``H(s) = C (s I - A)^-1 B + D + D_1 s + D_2 s^2 + ...``, (p, m) each; empty if proper."""
+        return self.output.U[1:]
+
+    @property
     def gamma(self) -> FloatArray:
-        """(n_i, n) rows of W^-1 for p''_i: the paper's gamma, equations (11), (20), (31)."""
-        return self._inverse_rows()[: self.partition.n_inertial]
+        """(n_i, n) rows of W^-1 for p''_i: the paper's gamma, equations (11), (20), (31).
+
+        Raises
+        ------
+        SingularLeadingMatrixError
+            The road is `deflation`, since W is singular.
+        """
+        return self._inverse_rows()[: len(self.partition.inertial)]
 
     @property
     def alpha(self) -> FloatArray:
-        """(n_c, n) rows of W^-1 for p'_c: the paper's alpha, equations (12), (32)."""
-        first = self.partition.n_inertial
-        return self._inverse_rows()[first : first + self.partition.n_half]
+        """(n_c, n) rows of W^-1 for p'_c: the paper's alpha, equations (12), (32).
+
+        Raises
+        ------
+        SingularLeadingMatrixError
+            The road is `deflation`, since W is singular.
+        """
+        first = len(self.partition.inertial)
+        return self._inverse_rows()[first : first + len(self.partition.half)]
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states: inertial and half displacements, then inertial velocities."""
-        return (*self.partition.inertial, *self.partition.half, *motion_names(self.partition.inertial, 1))
+        """Names of the states: displacements, then velocities."""
+        return self.partition.states
 
     def motion(self, derivative: int) -> Signal:
         """Give q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
@@ -134,10 +200,8 @@ class ExactReduction:
         q = given_values(q0, model.dofs, "displacement")
         v = given_values({} if v0 is None else v0, model.dofs, "velocity")
         u = np.broadcast_to(np.asarray(u0, dtype=float), (len(model.inputs),))
-        moving = self.partition.n_inertial + self.partition.n_half
-        p = self.partition.to_coordinates(np.nan_to_num(q)[:, None])[:moving, 0]
-        p_dot = self.partition.to_coordinates(np.nan_to_num(v)[:, None])[: self.partition.n_inertial, 0]
-        x = np.concatenate([p, p_dot])
+        from_q, from_v = self.partition.state_maps()[:2]
+        x = from_q @ np.nan_to_num(q) + from_v @ np.nan_to_num(v)
         if self.shift:
             x = x - self.shift[0] @ u
         for derivative, given in enumerate((q, v)):
@@ -187,15 +251,24 @@ class ExactReduction:
     def __repr__(self) -> str:
         """Say how many states came of which DOFs, and how sure that is."""
         part = self.partition
+        rests_on = "W" if self.leading is not None else "J"
         return (
             f"ExactReduction by {self.method}: {self.order} states, {self.n_infinite} infinite eigenvalues removed, "
-            f"index {self.index}, rcond(W) = {self.rcond:.1e}\n"
+            f"index {self.index}, rcond({rests_on}) = {self.rcond:.1e}\n"
             f"  inertial: {listed(part.inertial) or '-'}\n"
             f"  half:     {listed(part.half) or '-'}\n"
             f"  static:   {listed(part.static) or '-'}"
         )
 
+    def _rounding(self) -> Rounding:
+        if self.known_rounding is not None or self.leading is None or isinstance(self.partition, StateSelection):
+            return self.known_rounding  # type: ignore[return-value]
+        return rounding_of_solve(self.model, self.partition, self.leading, self.equations)
+
     def _inverse_rows(self) -> FloatArray:
+        if self.leading is None:
+            msg = "W of equation (2) is singular, so that alpha and gamma, the rows of its inverse, do not exist."
+            raise SingularLeadingMatrixError(msg, dofs=(), rcond=0.0)
         return self.leading.solve(np.eye(len(self.model.dofs)))
 
 
@@ -210,8 +283,9 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         Size of a mass, relative to the largest in scaled units, up to which it counts as none
         (see `partition.select_columns` and `partition.orthonormal_bases`). By default only exact
         zeros and rounding count as none.
-    method : {"selection", "orthogonal"}, optional
-        Road to take; by default selection of DOFs, and orthonormal bases where that leaves W singular.
+    method : {"selection", "orthogonal", "deflation"}, optional
+        Road to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
+        deflation where they do too (index above one).
 
     Returns
     -------
@@ -224,9 +298,23 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         The model has structural damping or other imaginary parts.
     ParameterError
         `tol` or `method` is none of what they can be.
+    SingularPencilError
+        No motion follows from the equations: ``det P(s)`` vanishes at every s, as with a redundant constraint or
+        a motion that nothing resists.
+    UncertainRankError
+        Entries nearly cancel, so that the number of states cannot be told to working precision.
     SingularLeadingMatrixError
-        W of equation (2) is singular to working precision (rcond below n eps after equilibration): a
-        constraint, an algebraic loop through dampers, or a motion that nothing resists.
+        `method` asks for a road on which W of equation (2) is singular to working precision (rcond below n eps
+        after equilibration).
+
+    Warns
+    -----
+    NearlyMasslessWarning
+        A mass is not zero but below 1e-10 of the others in scaled units.
+    CloseDecisionWarning
+        A decision about a rank rests on singular values less than 1e3 apart.
+    LostDigitsWarning
+        After deflation, A and B lose more than 1e-8 of the largest entry of the transfer function.
 
     Notes
     -----
@@ -242,32 +330,9 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     """
     if model.is_complex:
         raise complex_model_error(model)
-    partition, leading = _partitioned(model, tol, method)
-    n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
-    m, N = model.B.shape[1], moving + n_i
-    forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed((model.B, model.Bv, model.Ba))
-    right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
-    np.negative(partition.times_basis(model.K, 0, moving), out=right[:, :moving])
-    np.negative(partition.times_basis(model.C, 0, n_i), out=right[:, moving:N])
-    for k, matrix in enumerate(forces):
-        right[:, N + k * m : N + (k + 1) * m] = matrix
-    solved = leading.solve(right)
-    rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
-    rate[:n_i, moving:N] = unit_matrix(n_i)
-    rate[n_i:moving] = solved[n_i:moving]
-    rate[moving:] = solved[:n_i]
-    rate += 0.0  # leaves no negative zeros to be printed
-    A = rate[:, :N]
-    B, shift = _absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
-    return ExactReduction(
-        model=model,
-        partition=partition,
-        leading=leading,
-        A=read_only(A),
-        B=read_only(B),
-        displacement=_displacement(partition, solved, m, shift),
-        shift=shift,
-    )
+    _require_valid(tol, method)
+    found = None if method == "deflation" else _by_leading_matrix(model, tol, method)
+    return _by_deflation(model, tol) if found is None else found
 
 
 def complex_model_error(model: SecondOrderModel) -> ComplexModelError:
@@ -281,63 +346,112 @@ def complex_model_error(model: SecondOrderModel) -> ComplexModelError:
     return ComplexModelError(msg, matrices=letters)
 
 
-def _partitioned(model: SecondOrderModel, tol: float | None, method: Road | None) -> tuple[DofPartition, LeadingMatrix]:
-    """Take the first road whose W is nonsingular."""
-    if method not in (None, "selection", "orthogonal"):
-        msg = f"method must be 'selection', 'orthogonal' or None, not {method!r}."
+def _require_valid(tol: float | None, method: Road | None) -> None:
+    if method not in ROADS:
+        msg = f"method must be 'selection', 'orthogonal', 'deflation' or None, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
     if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):
         msg = f"tol = {tol!r}, but it is a relative size: a number from 0 to below 1, such as 1e-12."
         raise ParameterError(msg, parameter="tol", value=tol)
+
+
+def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road | None) -> ExactReduction | None:
+    """Take the first road whose W is nonsingular; None if there is none and no road was asked for."""
     if method != "orthogonal":
         partition = select_columns(model, tol)
-        W = _leading_columns(model, partition)
+        W = leading_columns(model, partition)
         leading = LeadingMatrix.factorized(W)
         if not leading.is_singular:
-            return partition, leading
+            return _reduced(model, partition, leading)
         if method == "selection":
             raise _singular_error(model, partition, W, leading)
     partition = orthonormal_bases(model, tol)
-    W = _leading_columns(model, partition)
+    W = leading_columns(model, partition)
     leading = LeadingMatrix.factorized(W)
-    if leading.is_singular:
+    if not leading.is_singular:
+        return _reduced(model, partition, leading)
+    if method == "orthogonal":
         raise _singular_error(model, partition, W, leading)
-    return partition, leading
+    return None
 
 
-def _leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatArray:
-    """Assemble W = [M T_i, C T_c, K T_k]."""
-    n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
-    W = np.empty(model.M.shape, order="F")
-    W[:, :n_i] = partition.times_basis(model.M, 0, n_i)
-    W[:, n_i:moving] = partition.times_basis(model.C, n_i, moving)
-    W[:, moving:] = partition.times_basis(model.K, moving, None)
-    return W
+def _reduced(model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix) -> ExactReduction:
+    _warn_of_close_decisions(partition.evidence)
+    if leading.rcond < CLOSE * len(model.dofs) * SINGULAR:
+        msg = (
+            f"The leading matrix W is regular, but hardly (rcond {leading.rcond:.1e}): the number of states rests on "
+            "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
+        )
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    return ExactReduction(
+        model=model,
+        partition=partition,
+        leading=leading,
+        equations=solved_at_once(model, partition, leading),
+        rcond=leading.rcond,
+    )
 
 
-def _absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Turn x' = A x + B_0 u + B_1 u' + B_2 u'' into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u', (5)."""
-    shift: tuple[FloatArray, ...] = ()
-    carried = driven[-1]
-    for lower in reversed(driven[:-1]):
-        shift = (carried, *shift)
-        carried = lower + A @ carried
-    return carried, shift
+def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
+    result = deflated(model, tol)
+    _warn_of_close_decisions(result.selection.evidence)
+    if result.loss > LOST:
+        msg = (
+            f"The state space is exact, but A and B in double precision lose {result.loss:.1e} of the largest entry of "
+            "the transfer function: the remaining equations are ill conditioned "
+            f"(reciprocal condition number {result.rcond:.1e}). descriptor_response keeps the digits."
+        )
+        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
+    return ExactReduction(
+        model=model,
+        partition=result.selection,
+        leading=None,
+        equations=result.equations,
+        rcond=result.rcond,
+        known_rounding=result.rounding,
+    )
 
 
-def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tuple[FloatArray, ...]) -> Signal:
-    """Assemble equation (4) from the states and the static rows of the solution of (3)."""
-    n, n_i, moving = solved.shape[0], partition.n_inertial, partition.n_inertial + partition.n_half
-    N = moving + n_i
-    X = np.zeros((n, N))
-    X[:, :moving] = partition.T[:, :moving]
-    inputs: tuple[FloatArray, ...] = ()
-    if moving < n:
-        T_k = partition.T[:, moving:]
-        X += T_k @ solved[moving:, :N]
-        inputs = tuple([T_k @ solved[moving:, start : start + m] for start in range(N, solved.shape[1], m)])
-    q = Signal(X, trimmed(inputs))
-    return q.plus(Signal(np.zeros_like(X), tuple([X @ part for part in shift]))) if shift else q
+def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
+    for decision in evidence:
+        if decision.gap < CLOSE:
+            values, rank = decision.singular_values, decision.rank
+            zero = f"{values[rank]:.1e} as zero" if rank < values.size else f"none as zero (bound {decision.bound:.1e})"
+            msg = (
+                f"A decision about a rank is close: of the singular values of a block of {decision.matrix}, "
+                f"{values[rank - 1]:.1e} counts and {zero}. It concerns DOFs {listed(decision.dofs)}: look for entries "
+                "that nearly cancel, or pass tol."
+            )
+            warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+
+
+def _index(reduction: ExactReduction) -> int:
+    """Find the index of the pencil (8) from the growth of its inverse.
+
+    With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass, the
+    transfer function grows as the inverse of (8) does.
+    """
+    model = reduction.model
+    unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
+    probe = replace(
+        model,
+        B=_beside(unit, zero),
+        Bv=_beside(zero, model.M),
+        Ba=_beside(zero, zero),
+        F=_beside(unit, zero).T,
+        G=_beside(zero, model.M.T).T,
+        H=_beside(zero, zero).T,
+        D=np.block([[zero, zero], [zero, -model.M]]),
+        Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
+        Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
+    )
+    result = deflated(probe)
+    grown = output_signal(probe, result.equations, lambda: result.rounding)
+    return len(without_rounding(probe, grown, result.rounding).U)
+
+
+def _beside(left: Matrix, right: Matrix) -> Matrix:
+    return read_only(np.hstack([left, right]))
 
 
 def _singular_error(

@@ -69,7 +69,7 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
 
     Raises
     ------
-    ComplexModelError, SingularPencilError, SingularLeadingMatrixError, ImproperError
+    ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         The model has no state space; nothing is written.
     FileFormatError
         The folder is a file, or holds an ``index.html`` that is no report.

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.descriptor import pencil_structure, require_regular
-from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, UncertainRankError
 from halfdof_ctrl.hessenberg import state_space_response
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import control_label, control_labels
@@ -72,8 +72,8 @@ def frequency_response(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        A model is reduced first; where no state space exists (complex, improper, or singular leading
-        matrix) its descriptor form is evaluated.
+        A model is reduced first; where no state space exists (complex, improper, order
+        uncertain) its descriptor form is evaluated.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points; by default a grid around the poles.
 
@@ -101,7 +101,7 @@ def frequency_response(
     if isinstance(sysdata, SecondOrderModel):
         try:
             sys = mech2ss(sysdata)
-        except (ComplexModelError, ImproperError, SingularLeadingMatrixError):
+        except (ComplexModelError, ImproperError, UncertainRankError):
             return descriptor_response(sysdata, omega)
     else:
         sys = sysdata

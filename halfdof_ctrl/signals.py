@@ -37,6 +37,26 @@ class Signal:
         return self.U[0] if self.U else np.zeros((self.X.shape[0], inputs))
 
 
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StateEquations:
+    """x' = A x + B u with the way back to q, for n DOFs, N states and m inputs."""
+
+    A: FloatArray  #: (N, N)
+    B: FloatArray  #: (N, m)
+    displacement: Signal  #: all n displacements, equation (4)
+    shift: tuple[FloatArray, ...]  #: E_0, E_1, ... of equation (5), (N, m) each
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Rounding:
+    """What the rounding errors of `StateEquations` are relative to."""
+
+    relative: float  #: the errors are this part of the sizes below
+    A: FloatArray  #: (N, N)
+    B: FloatArray  #: (N, m)
+    displacement: Signal
+
+
 def trimmed(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     """Drop coefficients of zeros at the end."""
     while parts and is_zero(parts[-1]):
@@ -48,3 +68,19 @@ def _sum(mine: FloatArray | None, theirs: FloatArray | None) -> FloatArray:
     if mine is None or theirs is None:
         return mine if theirs is None else theirs  # type: ignore[return-value]
     return mine + theirs
+
+
+def absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Turn x' = A x + B_0 u + B_1 u' + ... into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u' + ..., (5).
+
+    Returns
+    -------
+    B : (N, m) ndarray
+    (E_0, E_1, ...) : tuple of (N, m) ndarrays
+    """
+    shift: tuple[FloatArray, ...] = ()
+    carried = driven[-1]
+    for lower in reversed(driven[:-1]):
+        shift = (carried, *shift)
+        carried = lower + A @ carried
+    return carried, shift

@@ -6,20 +6,20 @@ with q = X x + U_0 u + U_1 u' + ... of equation (4). What remains of u', u'', ..
 function improper: it grows with frequency, and no state space has it.
 """
 
-from itertools import zip_longest
+from typing import Literal, TypeAlias
 
 import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.arrays import FloatArray, is_zero, unit_matrix
-from halfdof_ctrl.errors import ImproperError, SignalNameError
-from halfdof_ctrl.model import Names, SecondOrderModel, mechss
-from halfdof_ctrl.names import control_label, control_labels, listed
+from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.errors import ImproperError, ParameterError, SignalNameError
+from halfdof_ctrl.model import SecondOrderModel, mechss
+from halfdof_ctrl.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
-from halfdof_ctrl.signals import Signal, trimmed
+from halfdof_ctrl.signals import Signal
 
-ROUNDING = 32 * np.finfo(float).eps  #: times n: a coefficient of u' below this part of its terms is rounding
+Improper: TypeAlias = Literal["refuse", "drop"]
 
 
 def mech2ss(
@@ -36,6 +36,7 @@ def mech2ss(
     inputs: Names = None,
     outputs: Names = None,
     name: str | None = None,
+    improper: Improper = "refuse",
 ) -> control.StateSpace:
     """Convert a mechanical model to state space, exactly.
 
@@ -48,6 +49,10 @@ def mech2ss(
         As in `mechss`; only with M.
     dofs, inputs, outputs, name : optional
         As in `mechss`; only with M, since a model has its names already.
+    improper : {"refuse", "drop"}, optional
+        What to do where an output follows the derivative of an input: refuse the model by name (default), or
+        give the proper part ``C (s I - A)^-1 B + D`` alone; what is dropped is
+        `ExactReduction.polynomial_part`.
 
     Returns
     -------
@@ -59,11 +64,13 @@ def mech2ss(
     ------
     MatrixError, SignalNameError
         What `mechss` refuses.
-    ComplexModelError, SingularLeadingMatrixError
+    ComplexModelError, SingularPencilError, UncertainRankError
         What `exact_reduction` refuses.
     ImproperError
         An output follows the derivative of an input, such as the velocity of a static DOF under a
-        force of its own.
+        force of its own, and `improper` does not say that it is to be dropped.
+    ParameterError
+        `improper` is neither of what it can be.
 
     Examples
     --------
@@ -71,6 +78,9 @@ def mech2ss(
     array([[ 0.,  1.],
            [-4.,  0.]])
     """
+    if improper not in ("refuse", "drop"):
+        msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
+        raise ParameterError(msg, parameter="improper", value=improper)
     if isinstance(model, SecondOrderModel | ExactReduction):
         if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
@@ -80,10 +90,8 @@ def mech2ss(
         reduction = exact_reduction(
             mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
         )
-    output = output_signal(reduction)
-    if len(output.U) > 1:
-        output = _without_rounding(reduction, output)
-    if len(output.U) > 1:
+    output = reduction.output
+    if len(output.U) > 1 and improper == "refuse":
         raise _improper_error(reduction.model, output)
     model = reduction.model
     return labelled_system(
@@ -123,59 +131,6 @@ def labelled_system(
     )
 
 
-def output_signal(reduction: ExactReduction) -> Signal:
-    """Give the outputs of the reduced model as functions of the state, the inputs and their derivatives."""
-    model, q = reduction.model, reduction.displacement
-    output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
-    if not is_zero(model.G):
-        output = output.plus(q.combined(model.G).derivative(reduction.A, reduction.B))
-    if not is_zero(model.H):
-        acceleration = q.combined(model.H).derivative(reduction.A, reduction.B).derivative(reduction.A, reduction.B)
-        output = output.plus(acceleration)
-    direct = trimmed((model.D, model.Dv, model.Da))
-    return output.plus(Signal(np.zeros_like(output.X), direct)) if direct else output
-
-
-def _without_rounding(reduction: ExactReduction, output: Signal) -> Signal:
-    """Drop coefficients of u', u'', ... that are rounding errors of sums that cancel.
-
-    The bound evaluates (6) and (7) with absolute values, where an input's column in the solution of (3) is
-    known to 32 n eps of its largest entry, measured in the scaled unknowns.
-    """
-    model, A = reduction.model, np.abs(reduction.A)
-    B, q = _sizes(reduction)
-    bound = q.combined(np.abs(model.F))
-    for order, matrix in ((1, model.G), (2, model.H)):
-        term = q.combined(np.abs(matrix))
-        for _ in range(order):
-            term = term.derivative(A, B)
-        bound = bound.plus(term)
-    rounding = ROUNDING * len(model.dofs)
-    kept = [
-        np.where(np.abs(part) <= rounding * size, 0.0, part)
-        for part, size in zip_longest(output.U, bound.U[: len(output.U)], fillvalue=np.zeros_like(output.U[0]))
-    ]
-    return Signal(output.X, trimmed((output.U[0], *kept[1:])))
-
-
-def _sizes(reduction: ExactReduction) -> tuple[FloatArray, Signal]:
-    """Give what rounding errors in B and in equation (4) are relative to: (3) and (5) with absolute values."""
-    part, model, A = reduction.partition, reduction.model, np.abs(reduction.A)
-    n_i, moving = part.n_inertial, part.n_inertial + part.n_half
-    scale = np.ones(len(model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
-    known_to = np.abs(part.T) if part.sizes is None else part.sizes
-    rates, statics = [], []
-    for force in (model.B, model.Bv, model.Ba):
-        solution = np.abs(reduction.leading.solve(np.asfortranarray(force))) / scale[:, None]
-        size = scale[:, None] * solution.max(axis=0)
-        rates.append(np.vstack([np.zeros_like(size[:n_i]), size[n_i:moving], size[:n_i]]))
-        statics.append(known_to[:, moving:] @ size[moving:])
-    shift = rates[1] + A @ rates[2]
-    X = np.abs(reduction.displacement.X)
-    X[:, :moving] = np.maximum(X[:, :moving], known_to[:, :moving])
-    return rates[0] + A @ shift, Signal(X, (statics[0] + X @ shift, statics[1] + X @ rates[2], statics[2]))
-
-
 def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:
     """Make the refusal of improper pairs, by name and with the order of growth."""
     order = np.zeros(output.U[0].shape, dtype=int)
@@ -186,7 +141,8 @@ def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:
     msg = (
         f"No state space has the improper transfer functions {shown}: the output follows a derivative of the input, as "
         "the velocity of a static DOF or the acceleration of a half DOF does under a force of its own. Take another "
-        "output or input by select(), give the DOF its mass or damping, or filter the input; "
+        "output or input by select(), give the DOF its mass or damping, prescribe the acceleration "
+        "instead of the displacement, or filter the input; "
         "model(s) and descriptor_response evaluate it as it is."
     )
     return ImproperError(msg, pairs=pairs)

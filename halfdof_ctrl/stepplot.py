@@ -77,7 +77,7 @@ def step_plot(
         Axes of the wrong shape, times that are not equidistant, something that is neither system nor model.
     SignalNameError
         A unit for an unknown signal.
-    ComplexModelError, SingularLeadingMatrixError, ImproperError
+    ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         The model has no state space (see `mech2ss`).
 
     Examples
@@ -104,7 +104,7 @@ def step_plot(
             time, outputs[i, j], label=f"{prefix}outputs" if panels or prefix else "_outputs", **style
         )
     if reduction is not None and panels:
-        motion, kinds = reduction.recover(response), _kinds(reduction)
+        motion, kinds = reduction.recover(response), reduction.partition.kinds(reduction.model.dofs)
         for (row, (unit, dofs)), j in product(enumerate(panels.items(), start=p), range(m)):
             histories = [motion[dof][j] for dof in dofs]
             lines[row, j] += _draw_recovered(axes[row, j], time, histories, {d: kinds[d] for d in dofs}, prefix)
@@ -137,21 +137,10 @@ def _times(
     return step_times(relevant_poles(sys.A, sys.B, C, D), horizon)
 
 
-def _kinds(reduction: ExactReduction) -> dict[str, str]:
-    """Tell for each DOF that is not wholly inertial whether it is half or static."""
-    part = reduction.partition
-    moving = part.n_inertial + part.n_half
-    kinds: dict[str, str] = {}
-    for dof, row in zip(reduction.model.dofs, part.T, strict=True):
-        if row[part.n_inertial :].any():
-            kinds[dof] = "half" if row[part.n_inertial : moving].any() else "static"
-    return kinds
-
-
 def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:
     """Group the DOFs that are recovered by the unit they are drawn in."""
     groups: dict[str, list[str]] = {}
-    for dof in [] if reduction is None else _kinds(reduction):
+    for dof in [] if reduction is None else reduction.partition.kinds(reduction.model.dofs):
         groups.setdefault(f" [{typeset(units[dof])}]" if dof in units else "", []).append(dof)
     return groups
 

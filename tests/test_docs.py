@@ -53,7 +53,7 @@ def test_pages_that_the_code_cites_exist() -> None:
 
 
 def test_images_in_the_repository_are_small() -> None:
-    """Pictures are made by examples/ex01_hydromount.py at a size that a clone does not notice."""
+    """Pictures are made by the scripts of the examples at a size that a clone does not notice."""
     images = list((DOCS / "images").iterdir())
     assert images
     assert all(image.stat().st_size < LARGEST_PNG for image in images)

@@ -7,11 +7,13 @@ import pytest
 
 from halfdof_ctrl import errors
 from halfdof_ctrl.errors import (
+    CloseDecisionWarning,
     ComplexModelError,
     FileFormatError,
     HalfdofError,
     ImproperError,
     InconsistentStateError,
+    LostDigitsWarning,
     MatrixError,
     NearlyMasslessWarning,
     ParameterError,
@@ -19,6 +21,7 @@ from halfdof_ctrl.errors import (
     SingularLeadingMatrixError,
     SingularPencilError,
     StabilizationError,
+    UncertainRankError,
     WeightError,
 )
 
@@ -29,6 +32,7 @@ EXAMPLES: list[HalfdofError] = [
     ParameterError("m = -1", parameter="m", value=-1.0),
     SingularLeadingMatrixError("W is singular", dofs=("a", "b"), rcond=1e-18),
     SingularPencilError("floats", dofs=("a",)),
+    UncertainRankError("close", dofs=("a",), gap=2.0),
     ImproperError("grows", pairs=(("u", "y", 2),)),
     InconsistentStateError("contradicts", names=("a",), given=(1.0,), required=(2.0,)),
     WeightError("negative", names=("a",)),
@@ -60,6 +64,7 @@ def test_every_error_has_an_example_above() -> None:
     assert public - {HalfdofError} == {type(error) for error in EXAMPLES}
 
 
-def test_warning_is_a_user_warning() -> None:
+@pytest.mark.parametrize("kind", [NearlyMasslessWarning, CloseDecisionWarning, LostDigitsWarning])
+def test_warning_is_a_user_warning(kind: type[Warning]) -> None:
     """It can be filtered by its own type."""
-    assert issubclass(NearlyMasslessWarning, UserWarning)
+    assert issubclass(kind, UserWarning)

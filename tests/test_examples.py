@@ -44,6 +44,26 @@ def test_ex01_finds_the_published_pair_by_both_roads(tmp_path: Path, capsys: pyt
     assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_ex02_prints_its_tables_and_draws_every_panel(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mount's 175 N s/m of Guyan reduction put its pair 24 % off; each panel has its curves and lines."""
+    example = imported("ex02_alternatives")
+    assert not plt.get_fignums()
+    pair = np.roots([20.0, 175.0, 5250.0])[0]
+    assert_allclose(abs(pair - EXACT_PAIR) / abs(EXACT_PAIR), 0.24, rtol=0.01)
+    monkeypatch.setattr(example, "LIMIT", 50)
+    monkeypatch.setattr(example, "DPI", 40)
+    with plt.rc_context({"backend": "agg"}):
+        example.main(str(tmp_path / "figure.png"))
+    printed = capsys.readouterr().out
+    assert "| exact reduction | 4 | < 1e-13 | < 1e-13 | > 50 |" in printed
+    assert "| Guyan, half DOFs | 2 | 2.4e-01 | 8.9e-01 | > 50 |" in printed
+    assert [len(ax.get_lines()) for ax in plt.gcf().axes] == [4, 6, 5, 7, 10, 10]
+    plt.close("all")
+    assert (tmp_path / "figure.png").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebook_is_stored_without_outputs(path: Path) -> None:
     """Outputs are made by the reader, not kept in the repository."""

@@ -83,13 +83,19 @@ def test_names_of_states_never_clash() -> None:
     assert len(set(mech2ss(model).state_labels)) == len(states)
 
 
-def test_gap_of_a_rank_decision() -> None:
-    """Smallest singular value that counts over the largest that does not; inf where nothing is in doubt."""
-    values = np.array([4.0, 1.0, 1e-16])
-    assert_allclose(RankDecision(matrix="M", dofs=("a",), singular_values=values, rank=2).gap, 1e16, rtol=ROUNDOFF)
-    assert RankDecision(matrix="M", dofs=("a",), singular_values=values, rank=3).gap == np.inf
-    assert RankDecision(matrix="C", dofs=("a",), singular_values=np.zeros(2), rank=0).gap == np.inf
-    assert RankDecision(matrix="C", dofs=("a",), singular_values=np.array([1.0, 0.0]), rank=1).gap == np.inf
+@pytest.mark.parametrize(
+    ("values", "rank", "gap"),
+    [
+        ([4.0, 1.0, 1e-16], 2, 1e16),
+        ([4.0, 1.0, 1e-16], 3, 1e-16 / 1e-14),
+        ([0.0, 0.0], 0, np.inf),
+        ([1.0, 0.0], 1, np.inf),
+    ],
+)
+def test_gap_of_a_rank_decision(values: list[float], rank: int, gap: float) -> None:
+    """Smallest singular value that counts over the largest that does not, or over the bound where all count."""
+    decision = RankDecision(matrix="M", dofs=("a",), singular_values=np.array(values), rank=rank, bound=1e-14)
+    assert_allclose(decision.gap, gap, rtol=ROUNDOFF)
 
 
 @pytest.mark.parametrize("rank", [1, 2, 3])

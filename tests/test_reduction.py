@@ -28,7 +28,9 @@ from halfdof_ctrl.errors import (
     ParameterError,
     SignalNameError,
     SingularLeadingMatrixError,
+    SingularPencilError,
 )
+from halfdof_ctrl.partition import DofPartition
 
 EPS = float(np.finfo(float).eps)
 TRANSFER = 1e-10  # design, section 7: random structures, n <= 12, relative to the channel
@@ -43,11 +45,13 @@ POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  #
 def reduced(structure: Structure) -> ExactReduction:
     """Reduce, or drop the example after confirming exactly that the refusal is honest."""
     try:
-        return exact_reduction(structure.model())
-    except SingularLeadingMatrixError:
-        assert exact.leading_matrix_is_singular(*structure.matrices), "W is not singular: a false refusal"
+        reduction = exact_reduction(structure.model())
+    except SingularPencilError:
+        assert exact.order(*structure.matrices) < 0, "the pencil is regular: a false refusal"
         assume(False)  # noqa: FBT003
         raise
+    assert (reduction.method == "deflation") == exact.leading_matrix_is_singular(*structure.matrices)
+    return reduction
 
 
 def response(sys: control.StateSpace, points: npt.NDArray[np.complex128] = POINTS) -> npt.NDArray[np.complex128]:
@@ -95,7 +99,7 @@ def test_rounding_in_null_vectors_does_not_hide_a_singular_leading_matrix(
     """W is exactly singular; only rounding of C T_c or K T_k, equilibrated, makes it look regular."""
     assert exact.leading_matrix_is_singular(M, C, K)
     with pytest.raises(SingularLeadingMatrixError, match="singular to working precision"):
-        exact_reduction(mechss(M, C, K))
+        exact_reduction(mechss(M, C, K), method="orthogonal")
 
 
 @given(structure=structures())
@@ -115,7 +119,7 @@ def test_passive_pencil_is_regular_if_and_only_if_nothing_floats(structure: Stru
     if nothing_floats:
         assert exact_reduction(structure.model()).order == exact.order(*structure.matrices)
     else:
-        with pytest.raises(SingularLeadingMatrixError, match="singular to working precision"):
+        with pytest.raises(SingularPencilError, match="The pencil is singular"):
             exact_reduction(structure.model())
 
 
@@ -170,7 +174,7 @@ def test_units_of_dofs_and_equations_change_nothing(structure: Structure, column
     S, R = np.diag(10.0 ** np.array(columns[:n])), np.diag(10.0 ** np.array(rows[:n]))
     scaled = mechss(*structure.transformed(R, S), R, S)
     plain, other = exact_reduction(structure.model()), exact_reduction(scaled)
-    assert other.partition.coordinates == plain.partition.coordinates
+    assert other.states == plain.states
     assert (other.order, other.method) == (plain.order, plain.method)
     assert_same_transfer(response(mech2ss(other)), response(mech2ss(plain)), METAMORPHIC)
 
@@ -348,6 +352,7 @@ def test_alpha_and_gamma_are_rows_of_the_inverse_leading_matrix() -> None:
     M, C, K = semidefinite(generator, 5, 2), semidefinite(generator, 5, 4), semidefinite(generator, 5, 5)
     reduction = exact_reduction(mechss(M, C, K))
     part = reduction.partition
+    assert isinstance(part, DofPartition)
     T_i, T_c = part.T[:, : part.n_inertial], part.T[:, part.n_inertial : part.n_inertial + part.n_half]
     assert_allclose(reduction.gamma @ M @ T_i, np.eye(part.n_inertial), rtol=0.0, atol=ROUNDOFF)
     assert_allclose(reduction.alpha @ C @ T_c, np.eye(part.n_half), rtol=0.0, atol=ROUNDOFF)
@@ -373,7 +378,7 @@ def test_state_is_found_again_from_its_displacements_and_velocities(structure: S
 def test_wrong_displacement_of_a_static_dof_is_refused_by_name(structure: Structure, seed: int) -> None:
     """A static displacement off by a tenth contradicts its equation; the error holds both values."""
     reduction = exact_reduction(structure.model())
-    assume(reduction.partition.n_static > 0)
+    assume(reduction.partition.static)
     x = np.random.default_rng(seed).standard_normal(reduction.order)
     q0 = reduction.displacement.X @ x
     place = structure.model().dofs.index(reduction.partition.static[0])
@@ -511,19 +516,26 @@ def test_complex_model_is_refused_with_the_letters() -> None:
 
 
 def test_floating_node_is_refused_by_name() -> None:
-    """A massless node that nothing holds stands in the null vector of W."""
-    with pytest.raises(SingularLeadingMatrixError, match=r"DOFs loose\.") as refusal:
-        exact_reduction(mechss(np.diag([1, 0]), None, np.diag([1, 0]), dofs=["held", "loose"]))
+    """A massless node that nothing holds makes the pencil singular; on a road of W it stands in the null vector."""
+    model = mechss(np.diag([1, 0]), None, np.diag([1, 0]), dofs=["held", "loose"])
+    with pytest.raises(SingularPencilError, match="loose") as refusal:
+        exact_reduction(model)
     assert refusal.value.dofs == ("loose",)
-    assert refusal.value.rcond < 2 * EPS
+    with pytest.raises(SingularLeadingMatrixError, match=r"DOFs loose\.") as by_road:
+        exact_reduction(model, method="selection")
+    assert by_road.value.dofs == ("loose",)
+    assert by_road.value.rcond < 2 * EPS
 
 
-def test_lagrange_multiplier_is_refused_by_name() -> None:
+def test_lagrange_multiplier_is_refused_by_a_road_of_the_leading_matrix() -> None:
     """Two masses tied by a rigid constraint: index 3, refused with the multiplier among the names."""
     M, K = np.diag([1, 1, 0]), np.array([[2, 0, 1], [0, 3, -1], [1, -1, 0]])
+    model = mechss(M, None, K, dofs=["a", "b", "force"])
     with pytest.raises(SingularLeadingMatrixError, match="rigid constraint") as refusal:
-        exact_reduction(mechss(M, None, K, dofs=["a", "b", "force"]))
+        exact_reduction(model, method="orthogonal")
     assert "force" in refusal.value.dofs
+    with pytest.raises(SingularLeadingMatrixError, match="rows of its inverse, do not exist"):
+        _ = exact_reduction(model).alpha
 
 
 def test_selection_alone_is_refused_where_mixing_is_needed() -> None:
@@ -538,8 +550,8 @@ def test_selection_alone_is_refused_where_mixing_is_needed() -> None:
 
 
 def test_unknown_method_is_refused() -> None:
-    """Only the two roads are known."""
-    with pytest.raises(ParameterError, match="method must be 'selection', 'orthogonal' or None, not 'magic'"):
+    """Only the three roads are known."""
+    with pytest.raises(ParameterError, match="method must be 'selection', 'orthogonal', 'deflation' or None, not"):
         exact_reduction(hydromount(), method="magic")  # type: ignore[arg-type]
 
 

@@ -19,7 +19,7 @@ from halfdof_ctrl.errors import (
     ImproperError,
     MatrixError,
     SignalNameError,
-    SingularLeadingMatrixError,
+    SingularPencilError,
 )
 
 EPS = float(np.finfo(float).eps)
@@ -146,7 +146,7 @@ def test_bad_matrices_are_refused_at_the_same_door() -> None:
     """What `mechss` refuses, `mech2ss` refuses."""
     with pytest.raises(MatrixError, match="K must be 2 x 2"):
         mech2ss(np.eye(2), np.eye(2), np.eye(3))
-    with pytest.raises(SingularLeadingMatrixError, match="singular to working precision"):
+    with pytest.raises(SingularPencilError, match="The pencil is singular"):
         mech2ss(np.zeros((2, 2)), None, np.diag([1, 0]))
 
 

@@ -1,0 +1,96 @@
+"""Tests that a deflation must pass before it is given out, on P(s) and A alone.
+
+    det P(s) = const det(s I - A)                                                          (19)
+
+holds for every s if and only if A has the finite eigenvalues of the model, each as often. Three points near
+the typical frequency and two beyond the fastest pole tell a count that is wrong: each eigenvalue too many or too few
+changes the ratio between them by a power of the distance. What the state equations lose against a direct solve at
+such points is measured as well.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.offsets import IndexArray
+from halfdof_ctrl.scaling import equilibrating_factors
+from halfdof_ctrl.signals import StateEquations
+
+NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
+BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
+DRIFT = 0.1  #: change of the logarithm of the ratio in (19) that rounding may make
+SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
+SHARE = 1e-8  #: entries of null vectors above this are not rounding
+AXIS = (0.3j, 1.0j, 3.7j)  #: points for the loss of digits, in units of the time scale
+RESOLVED = 1e-6  #: P(s) with singular values below this part of the largest says nothing about lost digits
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScaledPencil:
+    """P(s) and B(s) of a `RowSystem`, unchanged by row operations: s in units of the time scale."""
+
+    P: FloatArray  #: (3, n, n)
+    B: FloatArray  #: (3, n, m)
+
+    def at(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
+        """Evaluate P and B."""
+        powers = s ** np.arange(len(self.P))
+        return np.tensordot(powers, self.P, axes=1), np.tensordot(powers, self.B, axes=1)
+
+    def is_singular(self) -> bool:
+        """Whether P(s) is singular to working precision at all points."""
+        return all(self._smallest(s) <= SINGULAR * self.P.shape[1] for s in NEAR)
+
+    def null_spaces(self) -> tuple[IndexArray, IndexArray]:
+        """Give the equations that are dependent and the unknowns that can move freely, at a generic point.
+
+        A left null vector combines the one, a right one moves the other, and another basis of the null spaces
+        has the same entries that are not zero.
+        """
+        (
+            left,
+            values,
+            right,
+        ) = np.linalg.svd(self._scaled(NEAR[0]))
+        null = values <= SINGULAR * values.size * max(float(values[0]), 1.0)
+        shares = np.abs(left[:, null]).max(axis=1, initial=0.0), np.abs(right[null]).max(axis=0, initial=0.0)
+        equations, unknowns = (np.flatnonzero(share > SHARE) for share in shares)
+        return equations, unknowns
+
+    def has_spectrum(self, A: FloatArray) -> bool:
+        """Whether (19) holds for A in the same units."""
+        fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
+        points = [*NEAR, *(BEYOND * max(fastest, 1.0) * direction for direction in NEAR[:2])]
+        unit = np.eye(len(A))
+        logs = []
+        for s in points:
+            P, _ = self.at(s)
+            rows, columns = equilibrating_factors(np.abs(P), even=2.0)
+            scale = float(np.log(rows).sum() + np.log(columns).sum())
+            logs.append(np.linalg.slogdet(P * rows[:, None] * columns)[1] - scale - np.linalg.slogdet(s * unit - A)[1])
+        return bool(np.ptp(logs) <= DRIFT)
+
+    def loss(self, equations: StateEquations) -> float:
+        """Measure the largest difference to a direct solve, relative to the largest entry at each point."""
+        N = len(equations.A)
+        worst = 0.0
+        for s in AXIS:
+            P, B = self.at(s)
+            if self._smallest(s) < RESOLVED:
+                continue
+            direct = np.linalg.solve(P, B)
+            found = equations.displacement.X @ np.linalg.solve(s * np.eye(N) - equations.A, equations.B.astype(complex))
+            for power, part in enumerate(equations.displacement.U):
+                found = found + s**power * part
+            worst = max(worst, float(np.abs(found - direct).max() / np.abs(direct).max()))
+        return worst
+
+    def _scaled(self, s: complex) -> ComplexArray:
+        P, _ = self.at(s)
+        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
+        return np.asarray(P * rows[:, None] * columns)
+
+    def _smallest(self, s: complex) -> float:
+        values = np.linalg.svd(self._scaled(s), compute_uv=False)
+        return float(values[-1] / values[0]) if values[0] > 0.0 else 0.0

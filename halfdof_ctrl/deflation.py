@@ -1,0 +1,255 @@
+"""State space of any regular pencil: the road for index above one.
+
+`relaxation` turns ``P(s) q = B(s) u`` into equations whose tight coefficients J, of the powers d_j - c_i of the
+offsets (15), are nonsingular. Equation i and its first c_i derivatives then hold. At level l = 0, 1, ...
+take the (c_i - l)-th derivative of all equations with c_i >= l: the highest derivatives in them are q_j^(d_j - l),
+with coefficients J. A nonsingular square part of these columns, nested from level to level,
+
+    J[c >= l, S_l] q_S^(d - l) = derivatives of u - lower derivatives - J[c >= l, others] q_others^(d - l),       (18)
+
+determines q_j^(d_j - l) for j in S_l (S_0 holds all j). All other q_j^(d_j - l) with l > 0 are the states:
+``sum d_j - sum c_i`` of them, as many as finite eigenvalues (S. E. Mattsson and G. Soederlind, Index reduction
+in differential-algebraic equations using dummy derivatives, 1993). So a state is always a displacement, a
+velocity or, rarely, a higher derivative of a DOF. Derivatives of u in (18) that remain become the polynomial part.
+
+With regular mass, or with W of equation (2) nonsingular for a selection of DOFs, all c_i are zero and (18) is (3).
+Derivation: docs/explanation/deflation.md.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from halfdof_ctrl.arrays import FloatArray, read_only
+from halfdof_ctrl.leading import LeadingMatrix
+from halfdof_ctrl.offsets import IndexArray, Offsets
+from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, levelled
+from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
+
+ROUNDING = 64 * EPS  #: what values of (18) are known to beside their followed errors
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Realization:
+    """State equations, and what they rest on."""
+
+    states: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
+    equations: StateEquations
+    rounding: Rounding
+    rcond: float  #: smallest reciprocal condition number of the square systems (18)
+
+    def in_model_units(self, units: Units) -> "Realization":
+        """Undo the scaling by powers of two, exactly."""
+        place = np.array(self.states, dtype=np.intp).reshape(len(self.states), 2)
+        states = units.columns[place[:, 0]] * units.time ** place[:, 1].astype(float)  # x = states x~
+        return replace(
+            self,
+            equations=_rescaled_equations(self.equations, states, units),
+            rounding=_rescaled_rounding(self.rounding, states, units),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Uncertain:
+    """Values and the mean squares of their rounding errors."""
+
+    value: FloatArray
+    square: FloatArray
+
+    @classmethod
+    def zeros(cls, *shape: int) -> "_Uncertain":
+        return cls(np.zeros(shape), np.zeros(shape))
+
+    def add_product(self, place: IndexArray, left: "_Uncertain", right: "_Uncertain") -> None:
+        """Subtract ``left @ right`` from some rows."""
+        self.value[place] -= left.value @ right.value
+        sizes = left.value**2
+        self.square[place] += sizes @ right.square + (left.square + EPS**2 * sizes) @ right.value**2
+
+    def at(self, *place: object) -> "_Uncertain":
+        """Give a part."""
+        return _Uncertain(self.value[place], self.square[place])  # type: ignore[index]
+
+    def column_parts(self, first: int, width: int) -> list["_Uncertain"]:
+        """Split the columns from `first` on into parts of one width."""
+        starts = range(first, self.value.shape[1], width)
+        return [_Uncertain(self.value[:, k : k + width], self.square[:, k : k + width]) for k in starts]
+
+
+def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realization:
+    """Choose the states, solve (18) from the lowest derivatives upwards, and give A, B and the way back to q.
+
+    Parameters
+    ----------
+    system : RowSystem
+        With nonsingular tight coefficients.
+    offsets : Offsets
+        Of the system.
+    caution : Caution
+        How many mean rounding errors count as zero.
+
+    Returns
+    -------
+    Realization
+        In the units of the system.
+    """
+    chain = _Chain.of(system, offsets)
+    states = chain.states()
+    derivatives, rcond = chain.solved(states, caution)
+    N, m = len(states), system.coefficients.shape[2] - system.size
+    place = np.array(states, dtype=np.intp).reshape(N, 2)
+    rate, motion = derivatives.at(place[:, 1] + 1, place[:, 0]), derivatives.at(0, slice(None))
+    A, dA = rate.value[:, :N], caution.entry * np.sqrt(rate.square[:, :N])
+    X, dX = motion.value[:, :N], caution.entry * np.sqrt(motion.square[:, :N])
+    driven, U = rate.column_parts(N, m), [part.value.copy() for part in motion.column_parts(N, m)]
+    B, shift = absorbed(A, [part.value for part in driven])
+    dB, shift_errors = _absorbed_errors(A, dA, driven, shift, caution)
+    dU = [caution.entry * np.sqrt(part.square) for part in motion.column_parts(N, m)]
+    for k, (part, error) in enumerate(zip(shift, shift_errors, strict=True)):
+        U[k] += X @ part
+        dU[k] += np.abs(X) @ error + dX @ np.abs(part)
+    return Realization(
+        states=states,
+        equations=StateEquations(
+            A=read_only(A + 0.0), B=read_only(B + 0.0), displacement=Signal(X, trimmed(tuple(U))), shift=trimmed(shift)
+        ),
+        rounding=Rounding(
+            relative=ROUNDING,
+            A=_size(A, dA),
+            B=_size(B, dB),
+            displacement=Signal(_size(X, dX), tuple([_size(part, error) for part, error in zip(U, dU, strict=True)])),
+        ),
+        rcond=rcond,
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Chain:
+    """The levels of (18)."""
+
+    system: RowSystem
+    offsets: Offsets
+    J: FloatArray
+    determined: tuple[IndexArray, ...]  #: S_0, S_1, ...
+
+    @classmethod
+    def of(cls, system: RowSystem, offsets: Offsets) -> "_Chain":
+        """Choose S_l inside S_{l-1}, well conditioned and with the last DOFs first, so that the first stay states."""
+        J = offsets.tight(system.matrix)
+        determined = [np.arange(system.size)]
+        for level in range(1, _levels(offsets)):
+            rows = np.flatnonzero(offsets.equations >= level)
+            columns = determined[-1][offsets.unknowns[determined[-1]] >= level]
+            columns = columns[::-1]
+            part = levelled(system, offsets, J, rows, columns).matrix
+            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size)
+            determined.append(np.sort(columns[picked]))
+        return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
+
+    def states(self) -> tuple[tuple[int, int], ...]:
+        """Give (unknown, derivative) of the states, displacements first."""
+        found = [
+            (int(d) - level, j)
+            for level in range(1, _levels(self.offsets))
+            for j, d in enumerate(self.offsets.unknowns)
+            if d >= level and j not in self.determined[level]
+        ]
+        return tuple([(j, order) for order, j in sorted(found)])
+
+    def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[_Uncertain, float]:
+        """Give q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u."""
+        c, d = self.offsets.equations, self.offsets.unknowns
+        n, N = self.system.size, len(states)
+        width = N + (self.system.coefficients.shape[2] - n) * (len(self.system.coefficients) + int(c.max()))
+        found = _Uncertain.zeros(int(d.max()) + 1, n, width)
+        for index, (j, order) in enumerate(states):
+            found.value[order, j, index] = 1.0
+        rcond = 1.0
+        for level in reversed(range(_levels(self.offsets))):
+            rows, columns = np.flatnonzero(c >= level), self.determined[level]
+            if rows.size:
+                right = self._right_side(rows, level, found, N)
+                solution, condition = self._solution(rows, columns, right, caution)
+                found.value[d[columns] - level, columns] = solution.value
+                found.square[d[columns] - level, columns] = solution.square
+                rcond = min(rcond, condition)
+        return found, rcond
+
+    def _right_side(self, rows: IndexArray, level: int, found: _Uncertain, N: int) -> _Uncertain:
+        """Everything in (18) but the unknowns that are to be found, which `found` still holds as zeros."""
+        T, V, n = self.system.coefficients, self.system.variance, self.system.size
+        right = _Uncertain.zeros(rows.size, found.value.shape[2])
+        m = T.shape[2] - n
+        for times in np.unique(self.offsets.equations[rows]).tolist():
+            place = np.flatnonzero(self.offsets.equations[rows] == times)
+            chosen = rows[place]
+            for k in range(len(T)):
+                order = k + times - level
+                if order < len(found.value) and T[k, chosen, :n].any():
+                    left = _Uncertain(T[k, chosen, :n], V[k, chosen, :n])
+                    right.add_product(place, left, _Uncertain(found.value[order], found.square[order]))
+                first = N + m * order
+                right.value[place, first : first + m] += T[k, chosen, n:]
+                right.square[place, first : first + m] += V[k, chosen, n:]
+        return right
+
+    def _solution(
+        self, rows: IndexArray, columns: IndexArray, right: _Uncertain, caution: Caution
+    ) -> tuple[_Uncertain, float]:
+        part = np.ix_(rows, columns)
+        matrix = np.asfortranarray(self.J[part])
+        variance = self.offsets.tight(self.system.variance[:, :, : self.system.size])[part]
+        leading = LeadingMatrix.factorized(matrix)
+        value = leading.solve(np.asfortranarray(right.value))
+        inverse = leading.solve(np.eye(rows.size, order="F"))
+        square = inverse**2 @ (right.square + (variance + EPS**2 * matrix**2) @ value**2)
+        nothing = np.abs(value) <= caution.entry * np.sqrt(square)
+        return _Uncertain(np.where(nothing, 0.0, value), np.where(nothing, 0.0, square)), leading.rcond
+
+
+def _levels(offsets: Offsets) -> int:
+    """Count the levels of (18), with those that have only states."""
+    return int(max(offsets.equations.max(), offsets.unknowns.max())) + 1
+
+
+def _size(value: FloatArray, error: FloatArray) -> FloatArray:
+    """Give what the error is relative to."""
+    return np.maximum(np.abs(value), error / ROUNDING)
+
+
+def _rescaled_equations(equations: StateEquations, states: FloatArray, units: Units) -> StateEquations:
+    slow = [units.time**-k for k in range(len(equations.shift))]
+    return StateEquations(
+        A=read_only(equations.A * states[:, None] / states * units.time),
+        B=read_only(equations.B * states[:, None] * units.time),
+        displacement=_rescaled_signal(equations.displacement, states, units),
+        shift=tuple([part * states[:, None] * factor for part, factor in zip(equations.shift, slow, strict=True)]),
+    )
+
+
+def _rescaled_rounding(rounding: Rounding, states: FloatArray, units: Units) -> Rounding:
+    return Rounding(
+        relative=rounding.relative,
+        A=rounding.A * states[:, None] / states * units.time,
+        B=rounding.B * states[:, None] * units.time,
+        displacement=_rescaled_signal(rounding.displacement, states, units),
+    )
+
+
+def _rescaled_signal(signal: Signal, states: FloatArray, units: Units) -> Signal:
+    """Bring displacements to the model's units; derivatives of u are by the model's time."""
+    rows = units.columns[:, None]
+    return Signal(signal.X * rows / states, tuple([part * rows * units.time**-k for k, part in enumerate(signal.U)]))
+
+
+def _absorbed_errors(
+    A: FloatArray, dA: FloatArray, driven: list[_Uncertain], shift: tuple[FloatArray, ...], caution: Caution
+) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Follow the errors through `absorbed`."""
+    errors: tuple[FloatArray, ...] = ()
+    carried = caution.entry * np.sqrt(driven[-1].square)
+    for k in reversed(range(len(driven) - 1)):
+        errors = (carried, *errors)
+        value = np.abs(shift[k])
+        carried = caution.entry * np.sqrt(driven[k].square) + np.abs(A) @ (carried + EPS * value) + dA @ value
+    return carried, errors

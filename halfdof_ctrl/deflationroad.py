@@ -1,0 +1,180 @@
+"""The whole road for any regular pencil: scale, relax, realize, certify.
+
+Decisions at the edge of rounding can be wrong. A deflation is taken only if it passes equation (19); where it
+does not, or where a pencil is called singular whose P(s) is not, the decisions are taken again with more or less
+caution about rounding errors. If none passes, the model is refused.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.certificate import ScaledPencil
+from halfdof_ctrl.deflation import Realization, realized
+from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.names import derivative_name, listed
+from halfdof_ctrl.offsets import IndexArray, Offsets
+from halfdof_ctrl.partition import RankDecision
+from halfdof_ctrl.relaxation import BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
+from halfdof_ctrl.signals import Rounding, StateEquations
+
+CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StateSelection:
+    """The states of a deflated model: displacements, velocities and, rarely, higher derivatives of DOFs."""
+
+    dofs: tuple[str, ...]  #: names of the n DOFs
+    places: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
+    differentiations: dict[str, int]  #: how often the equation of a DOF was differentiated, if at all
+    evidence: tuple[RankDecision, ...]  #: blocks of J, equation (16)
+
+    @property
+    def method(self) -> Literal["deflation"]:
+        """The road."""
+        return "deflation"
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states."""
+        return tuple([derivative_name(self.dofs[j], order, self.dofs) for j, order in self.places])
+
+    @property
+    def inertial(self) -> tuple[str, ...]:
+        """DOFs with two states or more."""
+        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count > 1])
+
+    @property
+    def half(self) -> tuple[str, ...]:
+        """DOFs with one state."""
+        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 1])
+
+    @property
+    def static(self) -> tuple[str, ...]:
+        """DOFs without a state: they follow from the others and the inputs."""
+        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
+
+    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+        """Tell for each of the model's DOFs with less than two states whether it is half or static."""
+        return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
+
+    def state_maps(self) -> tuple[FloatArray, ...]:
+        """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""
+        maps = np.zeros((max([order for _, order in self.places], default=0) + 2, len(self.places), len(self.dofs)))
+        for index, (j, order) in enumerate(self.places):
+            maps[order, index, j] = 1.0
+        return tuple(maps[: max(2, len(maps) - 1)])
+
+    def _counts(self) -> list[int]:
+        return [int(count) for count in np.bincount([j for j, _ in self.places], minlength=len(self.dofs))]
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Deflated:
+    """A model after deflation."""
+
+    selection: StateSelection
+    equations: StateEquations
+    rounding: Rounding
+    rcond: float  #: smallest reciprocal condition number of the square systems (18)
+    loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
+
+
+def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
+    """Reduce any regular model.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        A real model.
+    tol : float, optional
+        Singular values of a scaled block at most `tol` times its largest count as zero; by default what rounding
+        makes.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+    UncertainRankError
+        No decision about ranks leads to state equations with the spectrum of P(s).
+    """
+    P, B = np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba])
+    system, units = scaled_rows(P, B)
+    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    decisions: tuple[BlockDecision, ...] = ()
+    for caution in CAUTIONS:
+        relaxation = relaxed(system, caution, tol)
+        decisions = relaxation.decisions
+        if relaxation.offsets is None:
+            if pencil.is_singular():
+                raise _singular_error(model, pencil)
+            continue
+        result = realized(relaxation.system, relaxation.offsets, caution)
+        if pencil.has_spectrum(result.equations.A):
+            return _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
+    raise _uncertain_error(model, decisions)
+
+
+def _in_model_units(
+    model: SecondOrderModel,
+    relaxation: Relaxed,
+    offsets: Offsets,
+    result: Realization,
+    units: Units,
+    pencil: ScaledPencil,
+) -> Deflated:
+    final = result.in_model_units(units)
+    return Deflated(
+        selection=StateSelection(
+            dofs=model.dofs,
+            places=final.states,
+            differentiations={
+                model.dofs[i]: int(count) for i, count in enumerate(offsets.equations.tolist()) if count > 0
+            },
+            evidence=tuple([_evidence(model, decision) for decision in relaxation.decisions]),
+        ),
+        equations=final.equations,
+        rounding=final.rounding,
+        rcond=final.rcond,
+        loss=pencil.loss(result.equations),
+    )
+
+
+def _evidence(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
+    return RankDecision(
+        matrix="J",
+        dofs=_names(model, decision.unknowns),
+        singular_values=decision.singular_values,
+        rank=decision.rank,
+        bound=decision.bound,
+    )
+
+
+def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
+    return tuple([model.dofs[index] for index in places.tolist()])
+
+
+def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
+    equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
+    msg = (
+        f"The pencil is singular: det P(s) vanishes at every s. DOFs {listed(unknowns)} can move in any way without a "
+        f"force, and the equations of {listed(equations)} depend on each other."
+    )
+    return SingularPencilError(msg, dofs=unknowns)
+
+
+def _uncertain_error(model: SecondOrderModel, decisions: tuple[BlockDecision, ...]) -> UncertainRankError:
+    closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
+    dofs = model.dofs if closest is None else closest.dofs
+    gap = float("inf") if closest is None else closest.gap
+    msg = (
+        "No decision about ranks gives state equations with the spectrum of P(s): the model is singular or of another "
+        f"order to working precision. The closest decision is about DOFs {listed(dofs)} (singular values "
+        f"{gap:.1e} apart). Check their masses, dampers, springs and constraints for entries that nearly cancel, or "
+        "pass tol to say which count as zero."
+    )
+    return UncertainRankError(msg, dofs=dofs, gap=gap)
