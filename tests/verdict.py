@@ -34,6 +34,11 @@ class Improved:
         A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (system.A, system.B, system.C, system.D))
         return cls(A, B, C, D, polynomial)
 
+    def balanced(self) -> "Improved":
+        """Give the system with its states in units of a balanced A: powers of two, so that nothing is rounded."""
+        A, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
+        return Improved(A, self.B / scale[:, None], self.C * scale, self.D, self.polynomial)
+
     def at(self, points: npt.ArrayLike) -> ComplexArray:
         """Evaluate by a plain solve at each point: (p, m, k)."""
         unit = np.eye(len(self.A))
