@@ -27,6 +27,15 @@ RESOLVED = 1e-6  #: P(s) with singular values below this part of the largest say
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Losses:
+    """What state equations lose against direct solves, for m inputs."""
+
+    size: FloatArray  #: (m,) largest response to each input
+    error: FloatArray  #: (m,) largest error in it
+    worst: float  #: largest error relative to the largest entry at its frequency, where the direct solve can tell
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class ScaledPencil:
     """P(s) and B(s) of a `RowSystem`, unchanged by row operations: s in units of the time scale."""
 
@@ -71,20 +80,24 @@ class ScaledPencil:
             logs.append(np.linalg.slogdet(P * rows[:, None] * columns)[1] - scale - np.linalg.slogdet(s * unit - A)[1])
         return bool(np.ptp(logs) <= DRIFT)
 
-    def loss(self, equations: StateEquations) -> float:
-        """Measure the largest difference to a direct solve, relative to the largest entry at each point."""
-        N = len(equations.A)
-        worst = 0.0
+    def losses(self, equations: StateEquations) -> "Losses":
+        """Compare the state equations with direct solves at the points on the axis."""
+        N, m = equations.B.shape
+        size, error, worst = np.zeros(m), np.zeros(m), 0.0
         for s in AXIS:
             P, B = self.at(s)
-            if self._smallest(s) < RESOLVED:
+            smallest = self._smallest(s)
+            if smallest == 0.0:
                 continue
             direct = np.linalg.solve(P, B)
             found = equations.displacement.X @ np.linalg.solve(s * np.eye(N) - equations.A, equations.B.astype(complex))
             for power, part in enumerate(equations.displacement.U):
                 found = found + s**power * part
-            worst = max(worst, float(np.abs(found - direct).max() / np.abs(direct).max()))
-        return worst
+            size = np.maximum(size, np.abs(direct).max(axis=0, initial=0.0))
+            error = np.maximum(error, np.abs(found - direct).max(axis=0, initial=0.0))
+            if smallest > RESOLVED and direct.any():
+                worst = max(worst, float(np.abs(found - direct).max() / np.abs(direct).max()))
+        return Losses(size, error, worst)
 
     def _scaled(self, s: complex) -> ComplexArray:
         P, _ = self.at(s)

@@ -26,8 +26,6 @@ from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, levelled
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
-ROUNDING = 64 * EPS  #: what values of (18) are known to beside their followed errors
-
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Realization:
@@ -35,18 +33,7 @@ class Realization:
 
     states: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
     equations: StateEquations
-    rounding: Rounding
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
-
-    def in_model_units(self, units: Units) -> "Realization":
-        """Undo the scaling by powers of two, exactly."""
-        place = np.array(self.states, dtype=np.intp).reshape(len(self.states), 2)
-        states = units.columns[place[:, 0]] * units.time ** place[:, 1].astype(float)  # x = states x~
-        return replace(
-            self,
-            equations=_rescaled_equations(self.equations, states, units),
-            rounding=_rescaled_rounding(self.rounding, states, units),
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,15 +52,6 @@ class _Uncertain:
         self.value[place] -= left.value @ right.value
         sizes = left.value**2
         self.square[place] += sizes @ right.square + (left.square + EPS**2 * sizes) @ right.value**2
-
-    def at(self, *place: object) -> "_Uncertain":
-        """Give a part."""
-        return _Uncertain(self.value[place], self.square[place])  # type: ignore[index]
-
-    def column_parts(self, first: int, width: int) -> list["_Uncertain"]:
-        """Split the columns from `first` on into parts of one width."""
-        starts = range(first, self.value.shape[1], width)
-        return [_Uncertain(self.value[:, k : k + width], self.square[:, k : k + width]) for k in starts]
 
 
 def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realization:
@@ -98,29 +76,52 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
     derivatives, rcond = chain.solved(states, caution)
     N, m = len(states), system.coefficients.shape[2] - system.size
     place = np.array(states, dtype=np.intp).reshape(N, 2)
-    rate, motion = derivatives.at(place[:, 1] + 1, place[:, 0]), derivatives.at(0, slice(None))
-    A, dA = rate.value[:, :N], caution.entry * np.sqrt(rate.square[:, :N])
-    X, dX = motion.value[:, :N], caution.entry * np.sqrt(motion.square[:, :N])
-    driven, U = rate.column_parts(N, m), [part.value.copy() for part in motion.column_parts(N, m)]
-    B, shift = absorbed(A, [part.value for part in driven])
-    dB, shift_errors = _absorbed_errors(A, dA, driven, shift, caution)
-    dU = [caution.entry * np.sqrt(part.square) for part in motion.column_parts(N, m)]
-    for k, (part, error) in enumerate(zip(shift, shift_errors, strict=True)):
+    rate, motion = derivatives[place[:, 1] + 1, place[:, 0]], derivatives[0]
+    A, X = rate[:, :N] + 0.0, motion[:, :N]
+    B, shift = absorbed(A, _column_parts(rate, N, m))
+    U = [part.copy() for part in _column_parts(motion, N, m)]
+    for k, part in enumerate(shift):
         U[k] += X @ part
-        dU[k] += np.abs(X) @ error + dX @ np.abs(part)
-    return Realization(
-        states=states,
-        equations=StateEquations(
-            A=read_only(A + 0.0), B=read_only(B + 0.0), displacement=Signal(X, trimmed(tuple(U))), shift=trimmed(shift)
-        ),
-        rounding=Rounding(
-            relative=ROUNDING,
-            A=_size(A, dA),
-            B=_size(B, dB),
-            displacement=Signal(_size(X, dX), tuple([_size(part, error) for part, error in zip(U, dU, strict=True)])),
-        ),
-        rcond=rcond,
+    displacement = Signal(X, trimmed(tuple(U)))
+    equations = StateEquations(A=A, B=B + 0.0, displacement=displacement, shift=trimmed(shift))
+    return Realization(states=states, equations=equations, rcond=rcond)
+
+
+def in_model_units(realization: Realization, units: Units) -> StateEquations:
+    """Undo the scaling by powers of two, exactly."""
+    equations, place = realization.equations, np.array(realization.states, dtype=np.intp).reshape(-1, 2)
+    states = units.columns[place[:, 0]] * units.time ** place[:, 1].astype(float)  # x = states x~
+    return StateEquations(
+        A=read_only(equations.A * states[:, None] / states * units.time),
+        B=read_only(equations.B * states[:, None] * units.time),
+        displacement=_rescaled(equations.displacement, states, units),
+        shift=tuple([part * states[:, None] * units.time**-k for k, part in enumerate(equations.shift)]),
     )
+
+
+def rounding_in_model_units(realization: Realization, units: Units, columns: FloatArray, relative: float) -> Rounding:
+    """Give what the equations in the model's units are known to.
+
+    Parameters
+    ----------
+    realization : Realization
+        In scaled units.
+    units : Units
+    columns : (m,) ndarray
+        How large the response to each input is in scaled units: its coefficients are known to a part of that.
+    relative : float
+        That part.
+    """
+    scaled = realization.equations
+    q = scaled.displacement
+    sizes = StateEquations(
+        A=np.abs(scaled.A),
+        B=np.maximum(np.abs(scaled.B), np.abs(scaled.B).max(axis=0, initial=0.0)),
+        displacement=Signal(np.abs(q.X), tuple([np.maximum(np.abs(part), columns) for part in q.U])),
+        shift=(),
+    )
+    result = in_model_units(replace(realization, equations=sizes), units)
+    return Rounding(relative=relative, A=result.A, B=result.B, displacement=result.displacement)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -156,7 +157,7 @@ class _Chain:
         ]
         return tuple([(j, order) for order, j in sorted(found)])
 
-    def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[_Uncertain, float]:
+    def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[FloatArray, float]:
         """Give q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u."""
         c, d = self.offsets.equations, self.offsets.unknowns
         n, N = self.system.size, len(states)
@@ -173,7 +174,7 @@ class _Chain:
                 found.value[d[columns] - level, columns] = solution.value
                 found.square[d[columns] - level, columns] = solution.square
                 rcond = min(rcond, condition)
-        return found, rcond
+        return found.value, rcond
 
     def _right_side(self, rows: IndexArray, level: int, found: _Uncertain, N: int) -> _Uncertain:
         """Everything in (18) but the unknowns that are to be found, which `found` still holds as zeros."""
@@ -202,7 +203,8 @@ class _Chain:
         leading = LeadingMatrix.factorized(matrix)
         value = leading.solve(np.asfortranarray(right.value))
         inverse = leading.solve(np.eye(rows.size, order="F"))
-        square = inverse**2 @ (right.square + (variance + EPS**2 * matrix**2) @ value**2)
+        eliminated = EPS * leading.elimination_size()
+        square = inverse**2 @ (right.square + (variance + eliminated**2) @ value**2)
         nothing = np.abs(value) <= caution.entry * np.sqrt(square)
         return _Uncertain(np.where(nothing, 0.0, value), np.where(nothing, 0.0, square)), leading.rcond
 
@@ -212,44 +214,12 @@ def _levels(offsets: Offsets) -> int:
     return int(max(offsets.equations.max(), offsets.unknowns.max())) + 1
 
 
-def _size(value: FloatArray, error: FloatArray) -> FloatArray:
-    """Give what the error is relative to."""
-    return np.maximum(np.abs(value), error / ROUNDING)
-
-
-def _rescaled_equations(equations: StateEquations, states: FloatArray, units: Units) -> StateEquations:
-    slow = [units.time**-k for k in range(len(equations.shift))]
-    return StateEquations(
-        A=read_only(equations.A * states[:, None] / states * units.time),
-        B=read_only(equations.B * states[:, None] * units.time),
-        displacement=_rescaled_signal(equations.displacement, states, units),
-        shift=tuple([part * states[:, None] * factor for part, factor in zip(equations.shift, slow, strict=True)]),
-    )
-
-
-def _rescaled_rounding(rounding: Rounding, states: FloatArray, units: Units) -> Rounding:
-    return Rounding(
-        relative=rounding.relative,
-        A=rounding.A * states[:, None] / states * units.time,
-        B=rounding.B * states[:, None] * units.time,
-        displacement=_rescaled_signal(rounding.displacement, states, units),
-    )
-
-
-def _rescaled_signal(signal: Signal, states: FloatArray, units: Units) -> Signal:
+def _rescaled(signal: Signal, states: FloatArray, units: Units) -> Signal:
     """Bring displacements to the model's units; derivatives of u are by the model's time."""
     rows = units.columns[:, None]
     return Signal(signal.X * rows / states, tuple([part * rows * units.time**-k for k, part in enumerate(signal.U)]))
 
 
-def _absorbed_errors(
-    A: FloatArray, dA: FloatArray, driven: list[_Uncertain], shift: tuple[FloatArray, ...], caution: Caution
-) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Follow the errors through `absorbed`."""
-    errors: tuple[FloatArray, ...] = ()
-    carried = caution.entry * np.sqrt(driven[-1].square)
-    for k in reversed(range(len(driven) - 1)):
-        errors = (carried, *errors)
-        value = np.abs(shift[k])
-        carried = caution.entry * np.sqrt(driven[k].square) + np.abs(A) @ (carried + EPS * value) + dA @ value
-    return carried, errors
+def _column_parts(values: FloatArray, first: int, width: int) -> list[FloatArray]:
+    """Split the columns from `first` on into parts of one width."""
+    return [values[:, k : k + width] for k in range(first, values.shape[1], width)]

@@ -12,16 +12,18 @@ import numpy as np
 
 from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.certificate import ScaledPencil
-from halfdof_ctrl.deflation import Realization, realized
+from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
-from halfdof_ctrl.relaxation import BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
+from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, StateEquations
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
+ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
+NOISE = 30.0  #: ... and below this times the error that was measured
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -127,20 +129,21 @@ def _in_model_units(
     units: Units,
     pencil: ScaledPencil,
 ) -> Deflated:
-    final = result.in_model_units(units)
+    losses = pencil.losses(result.equations)
+    known_to = np.maximum(losses.size, NOISE / ROUNDING * losses.error)
     return Deflated(
         selection=StateSelection(
             dofs=model.dofs,
-            places=final.states,
+            places=result.states,
             differentiations={
                 model.dofs[i]: int(count) for i, count in enumerate(offsets.equations.tolist()) if count > 0
             },
             evidence=tuple([_evidence(model, decision) for decision in relaxation.decisions]),
         ),
-        equations=final.equations,
-        rounding=final.rounding,
-        rcond=final.rcond,
-        loss=pencil.loss(result.equations),
+        equations=in_model_units(result, units),
+        rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
+        rcond=result.rcond,
+        loss=losses.worst,
     )
 
 

@@ -50,6 +50,18 @@ class LeadingMatrix:
         L, U = np.tril(self.factors, -1) + np.eye(len(self.factors)), np.triu(self.factors)
         return np.asarray(scipy.linalg.svdvals(L @ U))
 
+    def elimination_size(self) -> FloatArray:
+        """Give ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
+        L, U = np.tril(np.abs(self.factors), -1) + np.eye(len(self.factors)), np.triu(np.abs(self.factors))
+        order = np.arange(len(self.factors))
+        for i, j in enumerate(self.pivots.tolist()):
+            order[[i, j]] = order[[j, i]]
+        size = np.empty_like(L)
+        size[order] = L @ U
+        if self.rows is not None and self.columns is not None:
+            size = size / self.rows[:, None] / self.columns
+        return size
+
     def solve(self, right: FloatArray) -> FloatArray:
         """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
         if self.rows is None or self.columns is None or self.equilibrated is None:
