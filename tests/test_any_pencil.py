@@ -35,7 +35,7 @@ from verdict import (
 )
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss
-from halfdof_ctrl.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.errors import ImproperError, LostDigitsWarning, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
 FAR = 1e-10  # in the roll-off, relative to the largest entry at any frequency
@@ -55,9 +55,15 @@ THOUSANDS = settings(max_examples=DEFAULT if DEFAULT < 1000 else max(DEFAULT, 20
 
 def reduced(model: SecondOrderModel) -> ExactReduction:
     """Reduce; that a decision was close may be said."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        return exact_reduction(model)
+    return reduced_aloud(model)[0]
+
+
+def reduced_aloud(model: SecondOrderModel) -> tuple[ExactReduction, bool]:
+    """Reduce, and tell whether it was said that digits are lost."""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        reduction = exact_reduction(model)
+    return reduction, any(issubclass(warning.category, LostDigitsWarning) for warning in said)
 
 
 def regular(model: SecondOrderModel) -> tuple[ExactReduction, RationalTransfer]:
@@ -133,19 +139,24 @@ def test_refusal_names_dofs_that_can_move_freely(structure: Structure) -> None:
 def test_transfer_function_is_exact_at_each_frequency(case: tuple[Structure, SecondOrderModel]) -> None:
     """State space and polynomial part together are H(s), to 1e-8 of the largest entry at each point.
 
-    What two huge parts of an improper H(s) leave of each other is compared with these parts.
+    What two huge parts of an improper H(s) leave of each other is compared with these parts. A model so ill
+    conditioned that no A and B in double precision keep the digits must be announced as such.
     """
-    reduction, exact = regular(case[1])
-    assert errors(complete(reduction), exact).max() <= TRANSFER
+    exact = rational_transfer(case[1])
+    assume(exact.order >= 0)
+    reduction, lost = reduced_aloud(case[1])
+    assert lost or errors(complete(reduction), exact).max() <= TRANSFER
 
 
 @THOUSANDS
 @given(case=drawn_models())
 def test_proper_channels_are_exact_on_their_own(case: tuple[Structure, SecondOrderModel]) -> None:
     """What is delivered without its polynomial part: the proper channels, into their roll-off."""
-    reduction, exact = regular(case[1])
-    proper = exact.growth <= 0
+    exact = rational_transfer(case[1])
+    proper = exact.growth <= 0 if exact.order >= 0 else np.zeros(1, dtype=bool)
     assume(proper.any())
+    reduction, lost = reduced_aloud(case[1])
+    assume(not lost)
     system = Improved.of(mech2ss(reduction, improper="drop"))
     near, far = system.at(POINTS)[proper][None], system.at(ROLL_OFF)[proper]
     assert transfer_errors(near, exact.at(POINTS)[proper][None]).max() <= TRANSFER

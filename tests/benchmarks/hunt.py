@@ -55,6 +55,7 @@ class Finding:
     method: str = "-"
     index: int = -1
     rcond: float = float("nan")
+    said: list[str] = field(default_factory=list)
 
 
 def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
@@ -62,8 +63,8 @@ def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -
     finding = Finding()
     exact = rational.rational_transfer(model)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
             reduction = hd.exact_reduction(model)
     except SingularPencilError as refusal:
         _judge_refusal(finding, structure, refusal, exact)
@@ -71,6 +72,7 @@ def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -
     except Exception as other:  # noqa: BLE001  # whatever it is, it is a finding
         finding.complaints.append(f"{type(other).__name__} for a pencil of order {exact.order}: {str(other)[:90]}")
         return finding
+    finding.said = sorted({warning.category.__name__ for warning in said})
     finding.method, finding.rcond = reduction.method, reduction.rcond
     if reduction.order != exact.order:
         finding.complaints.append(f"order {reduction.order}, exactly {exact.order}")
@@ -184,13 +186,15 @@ def main() -> None:
         row = kind.__name__
         counts[row]["cases"] += 1
         counts[row][finding.method] += 1
+        for warning in finding.said:
+            counts[row][warning] += 1
         for what, error in finding.errors.items():
             worst[row][what] = max(worst[row][what], error)
         if finding.complaints:
             counts[row]["failed"] += 1
             text = (
                 f"kind {row}, size {size}, seed {seed}, {finding.method}, index {finding.index}, "
-                f"rcond {finding.rcond:.0e}: " + "; ".join(finding.complaints)
+                f"rcond {finding.rcond:.0e}, {finding.said}: " + "; ".join(finding.complaints)
             )
             failures.append((size, f"{text}\n    {shown(structure, model)}"))
             print(text, flush=True)
