@@ -25,7 +25,7 @@ from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
-from halfdof_ctrl.spectrum import ROUNDING, eigenvalues_and_rounding
+from halfdof_ctrl.spectrum import ROUNDING, balanced_states, eigenvalues_and_rounding
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
@@ -181,7 +181,7 @@ class _Balanced:
         A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
         if A.size == 0:
             return cls(A, B, C, D)
-        balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+        balanced, scale = balanced_states(A)
         return cls(balanced, B / scale[:, None], C * scale, D)
 
     def __call__(self, points: ComplexArray) -> tuple[ComplexArray, FloatArray]:

@@ -28,7 +28,7 @@ from halfdof_ctrl.errors import StabilizationError, WeightError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import force_names, listed, motion_names
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
-from halfdof_ctrl.spectrum import balanced, eigenvalues_and_rounding
+from halfdof_ctrl.spectrum import balanced, balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.statespace import labelled_system, mech2ss
 
 UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
@@ -276,7 +276,7 @@ def _unsolved_error(poles: ComplexArray) -> StabilizationError:
 
 def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
     """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
-    matrix, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+    matrix, scale = balanced_states(A)
     shown = C * scale
     size = np.abs(shown).max(axis=1, keepdims=True)
     shown = shown / np.where(size > 0.0, size, 1.0) * np.linalg.norm(matrix, 2)

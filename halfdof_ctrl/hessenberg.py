@@ -24,6 +24,7 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.sparsesolve import sparse_response
+from halfdof_ctrl.spectrum import balanced_states
 
 BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
@@ -55,7 +56,7 @@ def state_space_response(
     values[:] = D[:, :, None]
     if A.shape[0] == 0:
         return values
-    matrix, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+    matrix, scale = balanced_states(A)
     balanced = np.asarray(matrix, dtype=np.float64)
     inputs, outputs = np.asarray(B / scale[:, None]), np.asarray(C * scale)
     batch = max(1, POINT_ENTRIES // A.shape[0])

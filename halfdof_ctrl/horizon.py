@@ -15,6 +15,7 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.errors import ParameterError
+from halfdof_ctrl.spectrum import balanced_states
 
 SETTLED = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
 MOST_PERIODS = 20  #: of a lightly damped mode; more would fill the picture
@@ -107,7 +108,7 @@ def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.
     A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (A, B, C, D))
     if A.size == 0:
         return np.zeros(0, dtype=np.complex128)
-    balanced, (scale, _) = scipy.linalg.matrix_balance(A, permute=False, separate=True)
+    balanced, scale = balanced_states(A)
     values, left, right = (np.asarray(part) for part in scipy.linalg.eig(balanced, left=True, right=True))
     product = np.einsum("ik,ik->k", left.conj(), right)
     cosine = np.abs(product)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import scipy.linalg
+from scipy.linalg.lapack import dgebal
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 
@@ -43,4 +44,21 @@ def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
 
 def balanced(A: FloatArray) -> FloatArray:
     """Scale the states by powers of two until rows and columns of A are of one size."""
-    return np.asarray(scipy.linalg.matrix_balance(A, permute=False)[0])
+    return balanced_states(A)[0]
+
+
+def balanced_states(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Scale the states by powers of two and give the scaled A and the factors, ``x = factors x~``.
+
+    LAPACK's gebal itself: `scipy.linalg.matrix_balance` turns the factors into integers too, which fails beyond 2^63.
+
+    Examples
+    --------
+    >>> matrix, factors = balanced_states(np.array([[1.0, 2.0**80], [0.0, 1.0]]))
+    >>> matrix.shape, factors.shape
+    ((2, 2), (2,))
+    """
+    if A.size == 0:
+        return A, np.ones(0)
+    matrix, _, _, factors, _ = dgebal(A, scale=1, permute=0)
+    return np.asarray(matrix), np.asarray(factors)
