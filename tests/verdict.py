@@ -37,7 +37,7 @@ class Improved:
     def balanced(self) -> "Improved":
         """Give the system with its states in units of a balanced A: powers of two, so that nothing is rounded."""
         A, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
-        return Improved(A, self.B / scale[:, None], self.C * scale, self.D, self.polynomial)
+        return Improved(np.asarray(A, dtype=float), self.B / scale[:, None], self.C * scale, self.D, self.polynomial)
 
     def at(self, points: npt.ArrayLike) -> ComplexArray:
         """Evaluate by a plain solve at each point: (p, m, k)."""
