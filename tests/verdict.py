@@ -16,6 +16,7 @@ ComplexArray = npt.NDArray[np.complex128]
 FloatArray = npt.NDArray[np.float64]
 
 EPS = float(np.finfo(float).eps)
+DEEP = 1e-2  #: of the largest entry at any frequency: where the roll-off is deep
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,10 +70,15 @@ def transfer_errors(actual: ComplexArray, desired: ComplexArray, also: ComplexAr
     return np.asarray(error / np.where(size > 0.0, size, 1.0))
 
 
-def overall_error(actual: ComplexArray, desired: ComplexArray) -> float:
-    """Give the largest error of (p, m, k) responses over the largest entry at any point."""
-    size = float(np.abs(desired).max(initial=0.0))
-    return float(np.abs(actual - desired).max(initial=0.0)) / (size if size > 0.0 else 1.0)
+def roll_off_error(actual: ComplexArray, desired: ComplexArray) -> float:
+    """Give the largest error of (c, k) channels where all are below a hundredth of the largest entry at any point.
+
+    It is relative to that largest entry: deep in the roll-off digits are counted from where the response came from.
+    """
+    at_points = np.abs(desired).max(axis=0, initial=0.0)
+    size = float(at_points.max(initial=0.0))
+    deep = at_points < DEEP * size
+    return float(np.abs(actual - desired)[:, deep].max(initial=0.0)) / size if deep.any() else 0.0
 
 
 def polynomial_error(actual: tuple[FloatArray, ...], desired: tuple[FloatArray, ...]) -> float:

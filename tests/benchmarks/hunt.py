@@ -24,9 +24,9 @@ from verdict import (
     Improved,
     characteristic_error,
     eigenvalue_error,
-    overall_error,
     polynomial_at,
     polynomial_error,
+    roll_off_error,
     transfer_errors,
 )
 
@@ -127,7 +127,7 @@ def _judge_channels(
     finding.errors["transfer"] = float(transfer_errors(near, exactly, also).max())
     proper = growth <= 0
     finding.errors["proper"] = float(transfer_errors(near[proper][None], exactly[proper][None]).max())
-    finding.errors["far"] = overall_error(system.at(roll_off)[proper], exact.at(roll_off)[proper])
+    finding.errors["far"] = roll_off_error(system.at(roll_off)[proper], exact.at(roll_off)[proper])
     finding.errors["characteristic"] = characteristic_error(system.A, exact, points)
     finding.errors["eigenvalue"] = eigenvalue_error(system.A, exact, floor=1.0 / tau)
 
