@@ -22,7 +22,7 @@ BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
 DRIFT = 0.1  #: change of the logarithm of the ratio in (19) that rounding may make
 SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
 SHARE = 1e-8  #: entries of null vectors above this are not rounding
-AXIS = (0.3j, 1.0j, 3.7j)  #: points for the loss of digits, in units of the time scale
+AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
 RESOLVED = 1e-6  #: P(s) with singular values below this part of the largest says nothing about lost digits
 
 
@@ -86,10 +86,11 @@ class ScaledPencil:
         size, error, worst = np.zeros(m), np.zeros(m), 0.0
         for s in AXIS:
             P, B = self.at(s)
-            smallest = self._smallest(s)
-            if smallest == 0.0:
+            try:
+                direct = np.linalg.solve(P, B)
+            except np.linalg.LinAlgError:  # an eigenvalue
                 continue
-            direct = np.linalg.solve(P, B)
+            smallest = self._smallest(s)
             found = equations.displacement.X @ np.linalg.solve(s * np.eye(N) - equations.A, equations.B.astype(complex))
             for power, part in enumerate(equations.displacement.U):
                 found = found + s**power * part

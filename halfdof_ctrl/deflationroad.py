@@ -20,6 +20,7 @@ from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, StateEquations
+from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
@@ -86,6 +87,13 @@ class Deflated:
     loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
 
 
+def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
+    """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
+    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
+
+
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     """Reduce any regular model.
 
@@ -95,7 +103,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
         A real model.
     tol : float, optional
         Singular values of a scaled block at most `tol` times its largest count as zero; by default what rounding
-        makes.
+        makes. With it the result is not certified, since it belongs to another model.
 
     Raises
     ------
@@ -116,7 +124,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
                 raise _singular_error(model, pencil)
             continue
         result = realized(relaxation.system, relaxation.offsets, caution)
-        if pencil.has_spectrum(result.equations.A):
+        if tol is not None or pencil.has_spectrum(result.equations.A):
             return _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
     raise _uncertain_error(model, decisions)
 

@@ -25,11 +25,12 @@ from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix
 from halfdof_ctrl.errors import NearlyMasslessWarning, callers_level
 from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
 from halfdof_ctrl.names import listed, motion_names
-from halfdof_ctrl.scaling import equilibrating_factors
+from halfdof_ctrl.scaling import equilibrating_factors, gap_threshold, logarithmic_scaling
 
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 
 RANK_TOLERANCE = 16 * np.finfo(float).eps  #: times the block's size; singular values below are null
+UNCLEAR = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * np.finfo(float).eps  #: times n: entries of C T and the like below this part of their terms are zero
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
 PLAIN_SPREAD = 1e5  #: of stiffness over mass between the DOFs; a smaller one needs no closer look
@@ -214,19 +215,24 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
     Returns
     -------
     DofPartition
-        Within a block that needs mixing the columns of T are orthonormal up to the block's scaling by
-        powers of two; elsewhere they select DOFs.
+        Within a block that needs mixing the columns of T are orthonormal in scaled units, the same whatever the
+        model's units are; elsewhere they select DOFs.
     """
     unit = unit_matrix(len(model.dofs))
-    massive, massless, first = _null_split("M", model.M, _Span(unit, unit), model.dofs, tol)
-    drag = cancelled(model.C, massless.columns, massless.sizes)
+    row_logs, column_logs, _ = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
+    rows, columns = np.exp2(np.round(row_logs))[:, None], np.exp2(np.round(column_logs))
+    massive, massless, first = _null_split("M", rows * model.M * columns, _Span(unit, unit), model.dofs, tol)
+    drag = cancelled(rows * model.C * columns, massless.columns, massless.sizes)
     half, static, second = _null_split("C", drag, massless, model.dofs, tol)
-    basis = np.hstack([massive.columns, half.columns, static.columns])
+    basis = np.hstack([massive.columns, half.columns, static.columns]) * columns[:, None]
+    sizes = np.hstack([massive.sizes, half.sizes, static.sizes]) * columns[:, None]
+    lengths = np.exp2(-np.ceil(np.log2(np.abs(basis).max(axis=0))))
+    basis, sizes = basis * lengths, sizes * lengths
     return DofPartition(
         method="orthogonal",
         order=np.arange(basis.shape[0]),
         basis=read_only(basis),
-        sizes=read_only(np.hstack([massive.sizes, half.sizes, static.sizes])),
+        sizes=read_only(sizes),
         in_order=False,
         n_inertial=massive.columns.shape[1],
         n_half=half.columns.shape[1],
@@ -290,7 +296,10 @@ def _null_split(
             continue
         row_factors, factors = equilibrating_factors(part, even=2.0)
         _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
-        bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
+        bound = tol
+        if bound is None:
+            bound = max(part.shape) * RANK_TOLERANCE
+            bound = gap_threshold(values / values[0], bound, bound * UNCLEAR)
         rank = int(np.count_nonzero(values > bound * values[0]))
         concerned = tuple([dofs[index] for index in np.flatnonzero(own.columns.any(axis=1)).tolist()])
         evidence.append(

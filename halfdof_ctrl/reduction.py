@@ -24,7 +24,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.deflationroad import StateSelection, deflated
+from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum
 from halfdof_ctrl.errors import (
     CloseDecisionWarning,
     ComplexModelError,
@@ -49,6 +49,7 @@ Road: TypeAlias = Literal["selection", "orthogonal", "deflation"]
 ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
+SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
 
@@ -362,27 +363,26 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
         W = leading_columns(model, partition)
         leading = LeadingMatrix.factorized(W)
         if not leading.is_singular:
-            return _reduced(model, partition, leading)
-        if method == "selection":
+            reduction = _reduced(model, partition, leading)
+            sure = method == "selection" or tol is not None or leading.rcond > SURELY_REGULAR
+            if sure or has_spectrum(model, reduction.A):
+                return _warned(reduction)
+        elif method == "selection":
             raise _singular_error(model, partition, W, leading)
     partition = orthonormal_bases(model, tol)
     W = leading_columns(model, partition)
     leading = LeadingMatrix.factorized(W)
     if not leading.is_singular:
-        return _reduced(model, partition, leading)
-    if method == "orthogonal":
+        reduction = _reduced(model, partition, leading)
+        sure = method == "orthogonal" or tol is not None
+        if sure or has_spectrum(model, reduction.A):  # bases of null spaces rest on rank decisions
+            return _warned(reduction)
+    elif method == "orthogonal":
         raise _singular_error(model, partition, W, leading)
     return None
 
 
 def _reduced(model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix) -> ExactReduction:
-    _warn_of_close_decisions(partition.evidence)
-    if leading.rcond < CLOSE * len(model.dofs) * SINGULAR:
-        msg = (
-            f"The leading matrix W is regular, but hardly (rcond {leading.rcond:.1e}): the number of states rests on "
-            "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
-        )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return ExactReduction(
         model=model,
         partition=partition,
@@ -390,6 +390,18 @@ def _reduced(model: SecondOrderModel, partition: DofPartition, leading: LeadingM
         equations=solved_at_once(model, partition, leading),
         rcond=leading.rcond,
     )
+
+
+def _warned(reduction: ExactReduction) -> ExactReduction:
+    """Warn of close decisions behind a W that is taken as nonsingular."""
+    _warn_of_close_decisions(reduction.partition.evidence)
+    if reduction.rcond < CLOSE * len(reduction.model.dofs) * SINGULAR:
+        msg = (
+            f"The leading matrix W is regular, but hardly (rcond {reduction.rcond:.1e}): the number of states rests on "
+            "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
+        )
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    return reduction
 
 
 def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:

@@ -22,7 +22,7 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.offsets import BoolArray, IndexArray, Offsets, irreducible_blocks, structural_offsets
-from halfdof_ctrl.scaling import levelling_factors, logarithmic_scaling
+from halfdof_ctrl.scaling import gap_threshold, levelling_factors, logarithmic_scaling
 
 EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
@@ -319,16 +319,6 @@ def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolA
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(row != 0.0, np.abs(row) / np.sqrt(square), 0.0)
     return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL))
-
-
-def gap_threshold(values: FloatArray, low: float, high: float) -> float:
-    """Give the middle of the widest gap between values from `low` to `high`; `low` itself if none lies there."""
-    inside = np.sort(values[(values > low) & (values < high)])
-    if inside.size == 0:
-        return low
-    edges = np.concatenate([[low], inside, [high]])
-    widest = int(np.argmax(edges[1:] / edges[:-1]))
-    return float(np.sqrt(edges[widest] * edges[widest + 1]))
 
 
 def _normalized(system: RowSystem, row: FloatArray, square: FloatArray) -> tuple[FloatArray, FloatArray, float]:

@@ -107,3 +107,13 @@ def levelling_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def _root_or_one(maxima: FloatArray) -> FloatArray:
     return np.sqrt(np.where(maxima > 0.0, maxima, 1.0))
+
+
+def gap_threshold(values: FloatArray, low: float, high: float) -> float:
+    """Give the middle of the widest gap between values from `low` to `high`; `low` itself if none lies there."""
+    inside = np.sort(values[(values > low) & (values < high)])
+    if inside.size == 0:
+        return low
+    edges = np.concatenate([[low], inside, [high]])
+    widest = int(np.argmax(edges[1:] / edges[:-1]))
+    return float(np.sqrt(edges[widest] * edges[widest + 1]))
