@@ -34,7 +34,7 @@ REGULAR: tuple[tuple[Problem, int, int], ...] = (  # order and index
     (problems.qep_with_two_infinite_eigenvalues, 4, 1),
     (problems.qep_with_nearby_eigenvalues, 5, 0),
     (problems.bilby, 7, 1),
-    (problems.intersection, 4, 2),
+    (problems.intersection, 4, 3),
     (mechanisms.mass_spring_with_bar, 14, 3),
     (mechanisms.triple_chain, 14, 3),
     (mechanisms.triple_chain_by_means, 14, 3),
