@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from halfdof_ctrl.arrays import FloatArray
 
 ZERO = 1e-12  #: of the matrix with unit diagonal
-DENSE_SIZE = 300  #: up to which a component is solved densely
+DENSE_SIZE = 100  #: up to which a component is solved densely
 LARGEST_COMPONENT = 20_000  #: that is factorized
 BATCH = 2**22  #: entries of dense blocks that are held at once
 BACKWARD_ERROR = 1e-14  #: of a solution with the factors, above which their pivots are not believed

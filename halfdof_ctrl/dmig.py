@@ -76,7 +76,8 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
         except (ValueError, IndexError) as cause:
             msg = f"a DMIG entry of {name!r} with fields that are no numbers. The file is damaged."
             raise FileFormatError(msg, path="", line=line) from cause
-    matrices = [_assembled(name, entries) for name, entries in found.items() if entries.form in SQUARE_FORMS]
+    square = {name: entries for name, entries in found.items() if entries.form in SQUARE_FORMS and entries.rows}
+    matrices = [_assembled(name, entries) for name, entries in square.items()]
     if not matrices:
         what = ", ".join(found) or "none"
         msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
@@ -100,13 +101,12 @@ def read_extrn(content: bytes) -> tuple[str, ...]:
     nodes: list[int] = []
     components: list[int] = []
     for fields, line in _bulk_entries(content, "EXTRN"):
-        given = [text.strip() for text in fields]
-        while given and not given[-1]:
-            given.pop()
-        if len(given) % 2 or not all(text.isdigit() for text in given):
+        texts = [text.strip() for text in fields]
+        pairs = [pair for pair in zip(texts[::2], texts[1::2], strict=False) if pair != ("", "")]
+        if not all(node.isdigit() and numbers.isdigit() for node, numbers in pairs):
             msg = "nodes and components belong into an EXTRN entry. The file is damaged."
             raise FileFormatError(msg, path="", line=line)
-        for node, numbers in zip(given[::2], given[1::2], strict=True):
+        for node, numbers in pairs:
             nodes += [int(node)] * len(numbers)
             components += [int(number) for number in numbers]
     if not nodes:
@@ -165,7 +165,7 @@ def _assembled(name: str, entries: _Entries) -> RawMatrix:
         declared=declared,
         format=f"Nastran DMIG, form {entries.form}",
         title=name,
-        dofs=dof_names(*zip(*places, strict=True)) if places else (),
+        dofs=dof_names(*zip(*places, strict=True)),
     )
 
 

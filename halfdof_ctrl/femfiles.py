@@ -244,6 +244,7 @@ def _looked_at(source: Source, letter: str, raw: RawMatrix, matrix: csc_array, l
         completed=raw.completed,
         half_stored=replace(raw, matrix=matrix).is_half_stored,
         notes=raw.notes,
+        doubts=raw.doubts,
     )
 
 

@@ -5,7 +5,7 @@ The format of a file is told by its content. What a matrix is comes from the use
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from halfdof_ctrl import abaqus, dmig, harwellboeing, matrixmarket, output4
@@ -15,6 +15,7 @@ from halfdof_ctrl.names import listed
 from halfdof_ctrl.rawmatrix import RawMatrix
 
 ENDINGS = (".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping")  #: in a folder
+NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
 LETTERS = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
 SIGNALS = ("B", "F", "G", "H")  #: that a file of that very name may hold
 
@@ -104,20 +105,21 @@ def _all_files(given: list[Path]) -> list[Path]:
 def _read(path: Path) -> list[RawMatrix] | tuple[str, ...]:  # noqa: PLR0911  # one return a format
     """Read the matrices of a file, or the names of rows, by what its content is."""
     content = path.read_bytes()
+    doubts = () if content.endswith((b"\n", b"\r")) else (NO_LAST_LINE_END,)
     if matrixmarket.is_matrix_market(content):
-        return [matrixmarket.read_matrix_market(content)]
+        return [replace(matrixmarket.read_matrix_market(content), doubts=doubts)]
     if path.suffix.lower() == ".mapping":
         return harwellboeing.read_mapping(content)
     if harwellboeing.is_harwell_boeing(content):
-        return [harwellboeing.read_harwell_boeing(content)]
+        return [replace(harwellboeing.read_harwell_boeing(content), doubts=doubts)]
     if output4.is_binary_output4(content) or output4.is_text_output4(content) or path.suffix.lower() == ".op4":
         return output4.read_output4(content)
     if dmig.has_dmig(content):
-        return dmig.read_dmig(content)
+        return [replace(raw, doubts=doubts) for raw in dmig.read_dmig(content)]
     if dmig.has_extrn(content):
         return dmig.read_extrn(content)
     if abaqus.data_columns(content):
-        return [abaqus.read_abaqus(content)]
+        return [replace(abaqus.read_abaqus(content), doubts=doubts)]
     msg = (
         f"the ending {path.suffix or '(none)'} names no format for this. Use .npz, .mat, or what Abaqus (*MATRIX "
         "OUTPUT), ANSYS (HBMAT, ASCII) or Nastran (OUTPUT4, DMIG) writes, or Matrix Market. The file is none of these, "

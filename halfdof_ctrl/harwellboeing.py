@@ -23,7 +23,7 @@ from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.errors import FileFormatError
 from halfdof_ctrl.labels import WORD, ansys_name
 from halfdof_ctrl.rawmatrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.textblocks import Lines, fixed_width, whole_numbers
+from halfdof_ctrl.textblocks import AS_PYTHON, Lines, fixed_width, whole_numbers
 
 TYPE = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
 FORMATS = re.compile(rb"\(((?:[^()]|\([^()]*\))*)\)")
@@ -199,10 +199,25 @@ def _section(lines: Lines, start: int, header: _Header, number: int, count: int)
     try:
         values = lines.fields(start, start + needed, width, per_line, count)
     except ValueError as cause:
-        raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number]) from cause
+        between = _between_blanks([lines[place] for place in range(start, start + needed)], per_line, count)
+        if between is None:
+            raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number]) from cause
+        values = between
     if not np.isfinite(values).all():
         raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number])
     return values
+
+
+def _between_blanks(part: list[bytes], per_line: int, count: int) -> FloatArray | None:
+    """Read fields that are not as wide as the header says, as `scipy.io.hb_write` (1.17) writes them."""
+    fields = [line.translate(AS_PYTHON).split() for line in part]
+    counts = [per_line] * (len(part) - 1) + [count - per_line * (len(part) - 1)]
+    if [len(found) for found in fields] != counts:
+        return None
+    try:
+        return np.array([field for found in fields for field in found]).astype(np.float64)
+    except ValueError:
+        return None
 
 
 def _bad_field(lines: Lines, where: range, layout: tuple[int, int], what: str) -> FileFormatError:

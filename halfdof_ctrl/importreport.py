@@ -41,6 +41,7 @@ class MatrixReport:
     null_columns: int
     inertia: Inertia  #: of the symmetric real part
     notes: tuple[str, ...]
+    doubts: tuple[str, ...]  #: what may be wrong with the file
 
     @property
     def symmetry(self) -> str:
@@ -87,6 +88,7 @@ class ImportReport:
             for part in self.matrices
             if part.half_stored
         ]
+        found += [f"{part.source} {doubt}." for part in self.matrices for doubt in part.doubts]
         found += [
             f"{part.letter} ({part.source}) is {part.inertia.in_words}: {part.inertia.negative} eigenvalues of its "
             "symmetric part are negative."
@@ -151,7 +153,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
     largest : int
         Components with more rows are not factorized for the rank.
     **found
-        format, stored, completed, half_stored and notes, as the reader found them.
+        format, stored, completed, half_stored, notes and doubts, as the reader found them.
     """
     real = csc_array(matrix.real)
     largest_entry = float(np.abs(matrix.data).max(initial=0.0))

@@ -217,7 +217,7 @@ def _sparse(head: _Head, body: _Bytes) -> csc_array:
     if not (sound and row.size == values.size == stored and ((row >= 0) & (row < rows)).all()):
         msg = f"the sparse matrix {head.name} has indices out of bounds"
         raise ValueError(msg)
-    matrix = csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=head.shape)
+    matrix = csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=(rows, columns))
     matrix.sum_duplicates()
     return matrix
 

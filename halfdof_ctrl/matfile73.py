@@ -87,6 +87,8 @@ def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN4
     if item.attrs.get("MATLAB_empty", 0):
         return []
     if item.dtype.kind == "O":
+        if _h5py().check_ref_dtype(item.dtype) is None:
+            raise _another_kind(name)
         cells = [file[reference] for reference in data.reshape(-1).tolist()]
         if not all(_is_char(cell) and len(cell.shape) == 2 and 1 in cell.shape for cell in cells):  # noqa: PLR2004
             raise _another_kind(name)

@@ -37,6 +37,7 @@ class RawMatrix:
     letter: str | None = None  #: M, C, K or S (structural damping), if the file tells
     dofs: tuple[str, ...] | None = None  #: names of its rows, if the file has labels
     notes: tuple[str, ...] = ()  #: anything else that a user should know
+    doubts: tuple[str, ...] = ()  #: what may be wrong with the file
 
     @property
     def is_half_stored(self) -> bool:

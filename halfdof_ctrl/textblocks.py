@@ -7,6 +7,7 @@ Fortran writes them, are cut out of padded lines, so that numbers without a blan
 
 import io
 import re
+import warnings
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,7 +17,8 @@ from halfdof_ctrl.errors import FileFormatError
 
 BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
-NEWLINE = 10
+NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
+TOO_LONG = "a line has more than its fields"
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
 
@@ -54,7 +56,9 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
         text = block.translate(AS_PYTHON)
         marked = comment.encode() in text
         try:
-            table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # of a block of comments
+                table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
         except ValueError as cause:
             raise _bad_row(text, columns, comment, line) from cause
         if table.size and (table.shape[1] != columns or not np.isfinite(table).all()):
@@ -98,7 +102,7 @@ def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Seque
     Raises
     ------
     ValueError
-        A field is no number.
+        A field is no number, or a line has more than its fields.
 
     Examples
     --------
@@ -106,6 +110,8 @@ def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Seque
     [1.0, -0.25, 3e-101]
     """
     full = width * per_line
+    if any(len(line) > full and line[full:].strip() for line in lines):
+        raise ValueError(TOO_LONG)
     text = b"".join([line[:full].ljust(full) for line in lines]).translate(AS_PYTHON)
     fields = np.frombuffer(text, dtype=f"S{width}").reshape(len(lines), per_line)
     return _parsed(fields[np.arange(per_line) < np.asarray(counts)[:, None]])
@@ -137,14 +143,16 @@ class Lines:
         Raises
         ------
         ValueError
-            A field is no number.
+            A field is no number, or a line has more than its fields.
         """
         lengths = np.diff(self.ends[first : stop - 1], prepend=self._start(first) - 1)
         full = width * per_line
         if lengths.size and lengths[0] > full and (lengths == lengths[0]).all():  # alike, so cut in one piece
             text = self.content[self._start(first) : int(self.ends[stop - 2]) + 1].translate(AS_PYTHON)
-            table = np.frombuffer(text, dtype=np.uint8).reshape(lengths.size, int(lengths[0]))[:, :full]
-            alike = _parsed(np.ascontiguousarray(table).reshape(-1).view(f"S{width}"))
+            table = np.frombuffer(text, dtype=np.uint8).reshape(lengths.size, int(lengths[0]))
+            if (table[:, full:] > BLANK).any():
+                raise ValueError(TOO_LONG)
+            alike = _parsed(np.ascontiguousarray(table[:, :full]).reshape(-1).view(f"S{width}"))
             last = fixed_width([self[stop - 1]], width, per_line, [count - alike.size])
             return np.concatenate([alike, last])
         counts = [per_line] * (stop - first - 1) + [count - per_line * (stop - first - 1)]
