@@ -70,10 +70,11 @@ def inertia(matrix: csc_array, largest: int = LARGEST_COMPONENT) -> Inertia:
     >>> inertia(csc_array([[3.0, -3.0], [-3.0, 3.0]]))
     Inertia(positive=1, negative=0, zero=1, unknown=0)
     """
-    symmetric = csc_array((matrix + matrix.T) / 2)
-    symmetric.eliminate_zeros()
-    count, label = connected_components(symmetric, directed=False)
+    count, label = connected_components(matrix, directed=False)
     sizes = np.bincount(label, minlength=count)
+    if sizes.min() > max(DENSE_SIZE, largest):
+        return Inertia(positive=0, negative=0, zero=0, unknown=matrix.shape[0])
+    symmetric = csc_array((matrix + matrix.T) / 2)
     order = np.argsort(label, kind="stable")
     first = np.cumsum(sizes) - sizes
     scaled = csc_array(csc_array(_at_unit_diagonal(symmetric)[order])[:, order])

@@ -114,12 +114,12 @@ def _read(path: Path) -> list[RawMatrix] | tuple[str, ...]:  # noqa: PLR0911  # 
         return [replace(harwellboeing.read_harwell_boeing(content), doubts=doubts)]
     if output4.is_binary_output4(content) or output4.is_text_output4(content) or path.suffix.lower() == ".op4":
         return output4.read_output4(content)
+    if abaqus.data_columns(content):
+        return [replace(abaqus.read_abaqus(content), doubts=doubts)]
     if dmig.has_dmig(content):
         return [replace(raw, doubts=doubts) for raw in dmig.read_dmig(content)]
     if dmig.has_extrn(content):
         return dmig.read_extrn(content)
-    if abaqus.data_columns(content):
-        return [replace(abaqus.read_abaqus(content), doubts=doubts)]
     msg = (
         f"the ending {path.suffix or '(none)'} names no format for this. Use .npz, .mat, or what Abaqus (*MATRIX "
         "OUTPUT), ANSYS (HBMAT, ASCII) or Nastran (OUTPUT4, DMIG) writes, or Matrix Market. The file is none of these, "

@@ -13,6 +13,7 @@ complex. Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
 """
 
 import re
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -33,20 +34,21 @@ NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
 CUT = "it ends within a matrix. The file is cut short."
 DAMAGED = "The file is damaged."
+LONGEST_LINE = 1024  #: characters
 
 
 @dataclass(slots=True)
 class _Matrix:
-    """A matrix while it is read."""
+    """A matrix while it is read: strings of values that stand below each other in a column."""
 
     name: str
     shape: tuple[int, int]
     form: int
     type: int
     big: bool
-    rows: list[npt.NDArray[np.int64]] = field(default_factory=list)
+    rows: list[int] = field(default_factory=list)  #: first row of each string, from one on
     columns: list[int] = field(default_factory=list)
-    values: list[npt.NDArray[Any]] = field(default_factory=list)  #: real numbers, two for a complex one
+    counts: list[int] = field(default_factory=list)  #: values of each string
 
     @property
     def per_value(self) -> int:
@@ -54,30 +56,48 @@ class _Matrix:
         return 2 if self.type in COMPLEX_TYPES else 1
 
     def add(self, column: int, row: int, count: int) -> None:
-        """Note where the next numbers belong, `column` and `row` counted from one."""
-        if not (0 < column <= self.shape[1] and row > 0 and count >= 0 and row - 1 + count <= self.shape[0]):
-            msg = f"{count} values from row {row} of column {column} in {self.name} of {self.shape}. {DAMAGED}"
-            raise FileFormatError(msg, path="")
-        self.rows.append(np.arange(row - 1, row - 1 + count))
-        self.columns.append(column - 1)
+        """Note where the next values belong, `column` and `row` counted from one."""
+        self.columns.append(column)
+        self.rows.append(row)
+        self.counts.append(count)
 
     def finished(self, numbers: npt.NDArray[Any], words: str) -> RawMatrix:
-        """Join what was read."""
+        """Put the numbers to their places."""
+        columns, rows, counts = (np.array(part, dtype=np.int64) for part in (self.columns, self.rows, self.counts))
+        outside = (
+            (columns < 1) | (columns > self.shape[1]) | (rows < 1) | (counts < 0) | (rows - 1 + counts > self.shape[0])
+        )
+        if outside.any():
+            first = int(np.argmax(outside))
+            msg = (
+                f"{counts[first]} values from row {rows[first]} of column {columns[first]} in {self.name}, which is "
+                f"{self.shape[0]} x {self.shape[1]}. {DAMAGED}"
+            )
+            raise FileFormatError(msg, path="")
         if not np.isfinite(numbers).all():
             msg = f"{self.name} has entries that are not finite. {DAMAGED}"
             raise FileFormatError(msg, path="")
         values = numbers[0::2] + 1j * numbers[1::2] if self.per_value > 1 else numbers
-        counts = [part.size for part in self.rows]
         declared: Declared = "symmetric" if self.form == SYMMETRIC_FORM else "unsaid"
         return assembled(
-            np.concatenate([np.zeros(0, dtype=np.int64), *self.rows]),
-            np.repeat(np.array(self.columns, dtype=np.int64), counts),
+            runs(rows - 1, counts),
+            np.repeat(columns - 1, counts),
             values,
             self.shape,
             declared=declared if self.shape[0] == self.shape[1] else "unsaid",
             format=f"Nastran OUTPUT4 {words}, form {self.form}",
             title=self.name,
         )
+
+
+def runs(starts: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Join runs of consecutive numbers.
+
+    >>> runs(np.array([5, 1]), np.array([2, 3])).tolist()
+    [5, 6, 1, 2, 3]
+    """
+    before = np.cumsum(lengths) - lengths
+    return np.asarray(np.arange(int(lengths.sum())) + np.repeat(starts - before, lengths))
 
 
 def is_binary_output4(content: bytes) -> bool:
@@ -126,80 +146,94 @@ def _byte_order(content: bytes) -> str | None:
 
 def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
     records = _records(content, order)
-    for head in records:
-        word = HEADER_BYTES.get(len(head))
+    for start, stop in records:
+        word = HEADER_BYTES.get(stop - start)
         if word is None:
-            msg = f"a record of {len(head)} bytes where a header should be. {DAMAGED}"
+            msg = f"a record of {stop - start} bytes where a header should be. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        integer, single = f"{order}i{word}", f"{order}f{word}"
-        numbers = np.frombuffer(head[: 4 * word], integer).tolist()
-        matrix = _opened(tuple(numbers), head[4 * word :].decode("latin-1"), len(content))
-        real = f"{order}f8" if matrix.type in DOUBLE_TYPES else single
-        for record in records:
-            if len(record) < 3 * word:
-                msg = f"a record of {len(record)} bytes where a column should be. {DAMAGED}"
+        integer = np.dtype(f"{order}i{word}")
+        name = content[start + 4 * word : stop].decode("latin-1")
+        matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, len(content))
+        real = np.dtype(f"{order}f8" if matrix.type in DOUBLE_TYPES else f"{order}f{word}")
+        places: list[int] = []
+        for begin, end in records:
+            if end - begin < 3 * word:
+                msg = f"a record of {end - begin} bytes where a column should be. {DAMAGED}"
                 raise FileFormatError(msg, path="")
-            column, row, words = np.frombuffer(record[: 3 * word], integer).tolist()
+            column, row, words = np.frombuffer(content, integer, 3, begin).tolist()
             if column > matrix.shape[1]:
                 break
-            _binary_column(matrix, record[3 * word :], (column, row, words), (integer, real))
+            if words * word != end - begin - 3 * word:
+                size = f"{words} words, but its record has {end - begin} bytes"
+                msg = f"column {column} of {matrix.name} says {size}. {DAMAGED}"
+                raise FileFormatError(msg, path="")
+            data = begin + 3 * word
+            if row > 0:
+                _note(matrix, places, (column, row, words), (data, word, real.itemsize))
+            else:
+                numbers = np.frombuffer(content, integer, words, data).tolist()
+                _sparse_column(matrix, places, (column, numbers), (data, word, real.itemsize))
         else:
             raise FileFormatError(CUT, path="")
-        numbers = np.concatenate([np.zeros(0), *matrix.values])
-        yield matrix.finished(numbers, "binary")
+        yield matrix.finished(_gathered(content, matrix, places, real), "binary")
 
 
-def _records(content: bytes, order: str) -> Iterator[bytes]:
-    """Give the records, each of which stands between two equal counts of its bytes."""
+def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
+    """Give where records begin and end, each of which stands between two equal counts of its bytes."""
+    mark = struct.Struct(f"{order}I")
     place = 0
     while place < len(content):
-        length = int(np.frombuffer(content[place : place + MARK].ljust(MARK, b"\0"), order + "u4")[0])
-        stop = place + MARK + length
+        stop = place + MARK + mark.unpack(content[place : place + MARK].ljust(MARK, b"\0"))[0]
         closing = content[stop : stop + MARK]
         if len(closing) < MARK:
             raise FileFormatError(CUT, path="")
-        if closing != content[place : place + MARK]:
+        if closing != content[place : place + MARK] or (stop - place) % MARK:
             msg = f"the record at byte {place} does not end as it begins. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        yield content[place + MARK : stop]
+        yield place + MARK, stop
         place = stop + MARK
 
 
-def _binary_column(matrix: _Matrix, data: bytes, head: tuple[int, int, int], types: tuple[str, str]) -> None:
-    column, row, words = head
-    word, real = np.dtype(types[0]).itemsize, np.dtype(types[1]).itemsize
-    if words * word != len(data) or words < 0:
-        msg = f"column {column} of {matrix.name} says {words} words, but its record has {len(data)} bytes. {DAMAGED}"
-        raise FileFormatError(msg, path="")
-    if row > 0:
-        _binary_string(matrix, data, (column, row), types[1])
-        return
+def _sparse_column(
+    matrix: _Matrix, places: list[int], words: tuple[int, list[int]], sizes: tuple[int, int, int]
+) -> None:
+    """Follow the strings of a column through its words."""
+    column, numbers = words
+    data, word, real = sizes
     place = 0
-    while place < len(data):
-        first = int(np.frombuffer(data[place : place + word], types[0])[0])
+    while place < len(numbers):
         if matrix.big:
-            if place + 2 * word > len(data):
-                raise FileFormatError(CUT, path="")
-            length, start = first, int(np.frombuffer(data[place + word : place + 2 * word], types[0])[0])
-            place += 2 * word
+            length, row = numbers[place], numbers[place + 1] if place + 1 < len(numbers) else 0
+            place += 2
         else:
-            length, start = first >> 16, first & 0xFFFF
-            place += word
-        stop = place + (length - 1) * word
-        if length < 1 or stop > len(data) or (stop - place) % (real * matrix.per_value):
+            length, row = numbers[place] >> 16, numbers[place] & 0xFFFF
+            place += 1
+        if length < 1 or place + length - 1 > len(numbers):
             msg = f"a string of {length} words in column {column} of {matrix.name}. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        _binary_string(matrix, data[place:stop], (column, start), types[1])
-        place = stop
+        _note(matrix, places, (column, row, length - 1), (data + place * word, word, real))
+        place += length - 1
 
 
-def _binary_string(matrix: _Matrix, data: bytes, where: tuple[int, int], real: str) -> None:
-    if len(data) % (np.dtype(real).itemsize * matrix.per_value):
-        msg = f"{len(data)} bytes in column {where[0]} of {matrix.name} are no whole values. {DAMAGED}"
+def _note(matrix: _Matrix, places: list[int], where: tuple[int, int, int], sizes: tuple[int, int, int]) -> None:
+    """Note a string of words at a byte of the file."""
+    column, row, words = where
+    data, word, real = sizes
+    count, rest = divmod(words * word, real * matrix.per_value)
+    if rest:
+        msg = f"{words} words in column {column} of {matrix.name} are no whole values. {DAMAGED}"
         raise FileFormatError(msg, path="")
-    numbers = np.frombuffer(data, real).astype(np.float64)
-    matrix.add(*where, numbers.size // matrix.per_value)
-    matrix.values.append(numbers)
+    matrix.add(column, row, count)
+    places.append(data)
+
+
+def _gathered(content: bytes, matrix: _Matrix, places: list[int], real: np.dtype[Any]) -> npt.NDArray[np.float64]:
+    """Take the values of all strings out of the file at once; records lie on multiples of four bytes."""
+    quarters = np.frombuffer(content, "u4", len(content) // MARK)
+    per_value = real.itemsize * matrix.per_value // MARK
+    lengths = np.array(matrix.counts, dtype=np.int64) * per_value
+    chosen = quarters[runs(np.array(places, dtype=np.int64) // MARK, lengths)]
+    return chosen.view(real).astype(np.float64)
 
 
 def _text_matrices(lines: Lines) -> Iterator[RawMatrix]:
@@ -240,9 +274,6 @@ def _text_header(line: str, length: int, number: int) -> tuple[_Matrix, int, int
         msg = f"the number format {line[stops[-1] :].strip()!r} is none of OUTPUT4. {DAMAGED}"
         raise FileFormatError(msg, path="", line=number + 1)
     return _opened(numbers, cuts[4], length), per_line, width
-
-
-LONGEST_LINE = 1024  #: characters
 
 
 def _integers(lines: Lines, number: int, count: int) -> list[int]:
