@@ -19,6 +19,7 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.errors import FileFormatError
+from halfdof_ctrl.rawmatrix import MOST_ROWS
 
 Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
 
@@ -26,7 +27,6 @@ HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
 MOST_BYTES = 16 * DENSE_ROW_LIMIT**2 + 2**16  #: of one complex matrix with its tags
 PEEK = 2**12  #: bytes that hold the name of a variable
-MOST_ROWS = 20_000_000  #: of a sparse matrix: index arrays of 160 MB
 MATRIX, COMPRESSED = 14, 15
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
