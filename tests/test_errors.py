@@ -95,7 +95,7 @@ def test_whatever_a_reader_raises_becomes_one_refusal_that_names_the_file(
 
 def test_a_missing_extra_stays_one_and_an_os_error_too() -> None:
     """Neither is a fault of the file."""
-    with pytest.raises(MissingExtraError, match="a.mat: needs h5py"), naming_the_file("a.mat"):
+    with pytest.raises(MissingExtraError, match=r"a\.mat: needs h5py"), naming_the_file("a.mat"):
         raise MissingExtraError("needs h5py", path="", extra="hdf5")
     with pytest.raises(FileNotFoundError), naming_the_file("a.mat"):
         raise FileNotFoundError
