@@ -18,6 +18,7 @@ import numpy as np
 from halfdof_ctrl.errors import FileFormatError
 from halfdof_ctrl.labels import dof_names
 from halfdof_ctrl.rawmatrix import Declared, RawMatrix, assembled
+from halfdof_ctrl.textblocks import printable
 
 SMALL, LARGE = 8, 16  #: characters of a field
 SYMMETRIC, SQUARE_FORMS, COMPLEX_TYPES = 6, (1, 6), (3, 4)
@@ -64,7 +65,7 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     """
     found: dict[str, _Entries] = {}
     for fields, line in _bulk_entries(content, "DMIG"):
-        name = fields[0].strip().lower()
+        name = printable(fields[0].encode("latin-1")).lower()
         try:
             if fields[1].strip() == "0":
                 found[name] = _Entries(int(fields[2]), int(fields[3]) in COMPLEX_TYPES)

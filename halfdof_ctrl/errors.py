@@ -155,7 +155,8 @@ def naming_the_file(path: object) -> Iterator[None]:
         raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal
     except HalfdofError as refusal:
         line = getattr(refusal, "line", None)
-        msg = f"{path}{'' if line is None else f', line {line}'}: {refusal}"
+        words = " ".join(str(refusal).splitlines())
+        msg = f"{path}{'' if line is None else f', line {line}'}: {words}"
         raise FileFormatError(msg, path=str(path), line=line) from refusal
     except OSError:
         raise

@@ -23,7 +23,7 @@ from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.errors import FileFormatError
 from halfdof_ctrl.labels import WORD, ansys_name
 from halfdof_ctrl.rawmatrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.textblocks import AS_PYTHON, Lines, fixed_width, whole_numbers
+from halfdof_ctrl.textblocks import AS_PYTHON, Lines, fixed_width, printable, whole_numbers
 
 TYPE = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
 FORMATS = re.compile(rb"\(((?:[^()]|\([^()]*\))*)\)")
@@ -149,7 +149,7 @@ def _header(lines: Lines, length: int) -> _Header:
         )
         raise FileFormatError(msg, path="")
     return _Header(
-        title=lines[0][:72].decode("latin-1").strip(),
+        title=printable(lines[0][:72]),
         kind=kind,
         shape=(rows, columns),
         entries=entries,

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.errors import FileFormatError
 from halfdof_ctrl.rawmatrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.textblocks import Lines, fixed_width
+from halfdof_ctrl.textblocks import Lines, fixed_width, printable
 
 SYMMETRIC_FORM = 6
 COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
@@ -133,8 +133,7 @@ def _opened(numbers: tuple[int, ...], name: str, length: int) -> _Matrix:
     if not sound:
         msg = f"a header with {columns} columns, {rows} rows and type {kind}. {DAMAGED}"
         raise FileFormatError(msg, path="")
-    clean = name.replace("\0", " ").strip().lower()
-    return _Matrix(clean, (abs(rows), columns), form, kind, big=rows < 0 or rows >= BIG)
+    return _Matrix(name.lower(), (abs(rows), columns), form, kind, big=rows < 0 or rows >= BIG)
 
 
 def _byte_order(content: bytes) -> str | None:
@@ -152,7 +151,7 @@ def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
             msg = f"a record of {stop - start} bytes where a header should be. {DAMAGED}"
             raise FileFormatError(msg, path="")
         integer = np.dtype(f"{order}i{word}")
-        name = content[start + 4 * word : stop].decode("latin-1")
+        name = printable(content[start + 4 * word : stop])
         matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, len(content))
         real = np.dtype(f"{order}f8" if matrix.type in DOUBLE_TYPES else f"{order}f{word}")
         places: list[int] = []
@@ -273,7 +272,7 @@ def _text_header(line: str, length: int, number: int) -> tuple[_Matrix, int, int
     if not 0 < per_line * width <= LONGEST_LINE:
         msg = f"the number format {line[stops[-1] :].strip()!r} is none of OUTPUT4. {DAMAGED}"
         raise FileFormatError(msg, path="", line=number + 1)
-    return _opened(numbers, cuts[4], length), per_line, width
+    return _opened(numbers, printable(cuts[4].encode("latin-1")), length), per_line, width
 
 
 def _integers(lines: Lines, number: int, count: int) -> list[int]:

@@ -83,6 +83,18 @@ def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], 
     return rounded.astype(np.int64)
 
 
+def printable(text: bytes) -> str:
+    r"""Give a name or title of a file for people to read, whatever damage did to it.
+
+    >>> printable(b"KAAX \x00\n")
+    'KAAX'
+    >>> printable(b"KA\nX")
+    'KA?X'
+    """
+    words = text.decode("latin-1").strip(" \0\r\n\t")
+    return "".join([letter if letter.isprintable() else "?" for letter in words])
+
+
 def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Sequence[int]) -> FloatArray:
     """Cut lines into fields of fixed width and parse them as numbers.
 

@@ -135,6 +135,10 @@ DENSE = output4_binary({"KAAX": K}, "dense")
         (BINARY[:32] + struct.pack("<i4xi", 4, 4), "a record of 4 bytes where a column should be"),
         (BINARY + struct.pack("<i4xi", 4, 4), "a record of 4 bytes where a header should be"),
         (struct.pack("<i", 24), "cut short"),
+        (
+            patched(patched(BINARY, 20, 0x410A0A41), 48, 3 + 65536 * 5),
+            r"2 values from row 3 of column 1 in a\?\?a, which",
+        ),
         (b"", "no matrix in it"),
     ],
 )
