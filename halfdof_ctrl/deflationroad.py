@@ -5,7 +5,7 @@ does not, or where a pencil is called singular whose P(s) is not, the decisions 
 caution about rounding errors. If none passes, the model is refused.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -18,9 +18,9 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
-from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, Units, relaxed, scaled_rows
-from halfdof_ctrl.signals import Rounding, StateEquations
-from halfdof_ctrl.spectrum import balanced
+from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
+from halfdof_ctrl.signals import Rounding, Signal, StateEquations
+from halfdof_ctrl.spectrum import balanced, balanced_states
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
@@ -85,13 +85,35 @@ class Deflated:
     rounding: Rounding
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
     loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
+    certified: bool  #: whether (19) holds, as it need not where `tol` was given
 
 
 def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
     """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    _, units, pencil = _scaled(model)
     return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
+
+
+def loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Measure what state equations, from whatever road, lose against direct solves."""
+    _, units, pencil = _scaled(model)
+    A, states = balanced_states(np.asarray(equations.A / units.time))
+    q = equations.displacement
+    across, down = units.inputs / units.columns[:, None], 1.0 / units.columns[:, None]
+    scaled = StateEquations(
+        A=A,
+        B=equations.B / states[:, None] * units.inputs / units.time,
+        displacement=Signal(
+            q.X * states * down, tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
+        ),
+        shift=(),
+    )
+    return pencil.losses(scaled).worst
+
+
+def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
+    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    return system, units, ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
@@ -103,7 +125,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
         A real model.
     tol : float, optional
         Singular values of a scaled block at most `tol` times its largest count as zero; by default what rounding
-        makes. With it the result is not certified, since it belongs to another model.
+        makes. With it the result need not pass (19), since it belongs to another model.
 
     Raises
     ------
@@ -112,9 +134,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    P, B = np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba])
-    system, units = scaled_rows(P, B)
-    pencil = ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    system, units, pencil = _scaled(model)
     decisions: tuple[BlockDecision, ...] = ()
     for caution in CAUTIONS:
         relaxation = relaxed(system, caution, tol)
@@ -124,9 +144,11 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
                 raise _singular_error(model, pencil)
             continue
         result = realized(relaxation.system, relaxation.offsets, caution)
-        if tol is not None or pencil.has_spectrum(result.equations.A):
-            return _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-    raise _uncertain_error(model, decisions)
+        certified = pencil.has_spectrum(result.equations.A)
+        if certified or tol is not None:
+            found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
+            return replace(found, certified=certified)
+    raise _uncertain_error(model, decisions, tol)
 
 
 def _in_model_units(
@@ -152,6 +174,7 @@ def _in_model_units(
         rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
         rcond=result.rcond,
         loss=losses.worst,
+        certified=True,
     )
 
 
@@ -172,20 +195,25 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
     equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
     msg = (
-        f"The pencil is singular: det P(s) vanishes at every s. DOFs {listed(unknowns)} can move in any way without a "
-        f"force, and the equations of {listed(equations)} depend on each other."
+        f"The pencil is singular: det P(s) vanishes at every s, to working precision. DOFs {listed(unknowns)} can move "
+        f"in any way without a force, and the equations of {listed(equations)} depend on each other: a node without "
+        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant "
+        "or give it a stiffness."
     )
-    return SingularPencilError(msg, dofs=unknowns)
+    return SingularPencilError(msg, dofs=unknowns, equations=equations)
 
 
-def _uncertain_error(model: SecondOrderModel, decisions: tuple[BlockDecision, ...]) -> UncertainRankError:
+def _uncertain_error(
+    model: SecondOrderModel, decisions: tuple[BlockDecision, ...], tol: float | None
+) -> UncertainRankError:
     closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
+    rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
     msg = (
-        "No decision about ranks gives state equations with the spectrum of P(s): the model is singular or of another "
-        f"order to working precision. The closest decision is about DOFs {listed(dofs)} (singular values "
-        f"{gap:.1e} apart). Check their masses, dampers, springs and constraints for entries that nearly cancel, or "
-        "pass tol to say which count as zero."
+        f"No decision about ranks gives state equations with the spectrum of P(s): to working precision {rest}. The "
+        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, dampers, "
+        f"springs and constraints for entries that nearly cancel, or pass {'tol' if tol is None else 'another tol'} to "
+        "say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)
