@@ -16,6 +16,7 @@ from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.offsets import IndexArray
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import StateEquations
+from halfdof_ctrl.spectrum import balanced_states
 
 NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
 BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
@@ -30,22 +31,23 @@ DOUBT = 4 * float(np.finfo(float).eps)  #: times n and the condition of P(s): di
 class Losses:
     """What state equations lose against direct solves, for m inputs."""
 
-    size: FloatArray  #: (m,) largest response to each input
+    size: FloatArray  #: (m,) largest displacement under each input
     error: FloatArray  #: (m,) largest error in it
-    worst: float  #: largest error relative to the largest entry at its frequency, where the direct solve can tell
+    worst: float  #: of the outputs, relative to the largest at its frequency, where the direct solve can tell
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScaledPencil:
-    """P(s) and B(s) of a `RowSystem`, unchanged by row operations: s in units of the time scale."""
+    """The four quadratics of a model in scaled units, before any row operation: s in units of the time scale."""
 
     P: FloatArray  #: (3, n, n)
     B: FloatArray  #: (3, n, m)
+    F: FloatArray  #: (3, p, n)
+    D: FloatArray  #: (3, p, m)
 
     def at(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
         """Evaluate P and B."""
-        powers = s ** np.arange(len(self.P))
-        return np.tensordot(powers, self.P, axes=1), np.tensordot(powers, self.B, axes=1)
+        return _at(self.P, s), _at(self.B, s)
 
     def is_singular(self) -> bool:
         """Whether P(s) is singular to working precision at all points."""
@@ -77,8 +79,10 @@ class ScaledPencil:
         return bool(np.ptp(logs) <= DRIFT)
 
     def losses(self, equations: StateEquations) -> "Losses":
-        """Compare the state equations with direct solves at the points on the axis."""
+        """Compare the state equations, balanced, with direct solves at the points on the axis."""
         N, m = equations.B.shape
+        A, factors = balanced_states(equations.A)
+        into, X = equations.B / factors[:, None], equations.displacement.X * factors
         size, error, worst = np.zeros(m), np.zeros(m), 0.0
         for s in AXIS:
             P, B = self.at(s)
@@ -86,17 +90,18 @@ class ScaledPencil:
             matrix = P * rows * columns.T
             try:
                 direct = columns * np.linalg.solve(matrix, rows * B)
-                found = equations.displacement.X @ np.linalg.solve(s * np.eye(N) - equations.A, equations.B + 0j)
+                found = X @ np.linalg.solve(s * np.eye(N) - A, into + 0j)
             except np.linalg.LinAlgError:  # an eigenvalue
                 continue
             for power, part in enumerate(equations.displacement.U):
                 found = found + s**power * part
             size = np.maximum(size, np.abs(direct).max(axis=0, initial=0.0))
-            difference = np.abs(found - direct)
-            error = np.maximum(error, difference.max(axis=0, initial=0.0))
-            lost, largest = ((np.abs(part) / columns).max(initial=0.0) for part in (difference, direct))
-            if lost > DOUBT * len(matrix) * np.linalg.cond(matrix) * largest:
-                worst = max(worst, float(lost / largest))
+            error = np.maximum(error, np.abs(found - direct).max(axis=0, initial=0.0))
+            F, output = _at(self.F, s), _at(self.F, s) @ direct + _at(self.D, s)
+            lost = float(np.abs(F @ (found - direct)).max())
+            doubt = float((np.abs(F) @ columns).max() * (np.abs(direct) / columns).max()) * np.linalg.cond(matrix)
+            if output.any() and lost > DOUBT * len(matrix) * doubt:
+                worst = max(worst, lost / float(np.abs(output).max()))
         return Losses(size, error, worst)
 
     def _scaled(self, s: complex) -> ComplexArray:
@@ -107,3 +112,8 @@ class ScaledPencil:
     def _smallest(self, s: complex) -> float:
         values = np.linalg.svd(self._scaled(s), compute_uv=False)
         return float(values[-1] / values[0]) if values[0] > 0.0 else 0.0
+
+
+def _at(coefficients: FloatArray, s: complex) -> ComplexArray:
+    """Evaluate a matrix polynomial."""
+    return np.asarray(np.tensordot(s ** np.arange(len(coefficients)), coefficients, axes=1))

@@ -26,6 +26,8 @@ from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, levelled
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
+CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Realization:
@@ -33,6 +35,7 @@ class Realization:
 
     states: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
     equations: StateEquations
+    errors: tuple[FloatArray, ...]  #: (n, m) each, mean rounding errors of the displacements' U_0, U_1, ...
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
 
 
@@ -52,6 +55,10 @@ class _Uncertain:
         self.value[place] -= left.value @ right.value
         sizes = left.value**2
         self.square[place] += sizes @ right.square + (left.square + EPS**2 * sizes) @ right.value**2
+
+    def at(self, *place: object) -> "_Uncertain":
+        """Give a part."""
+        return _Uncertain(self.value[place], self.square[place])  # type: ignore[index]
 
 
 def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realization:
@@ -76,15 +83,17 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
     derivatives, rcond = chain.solved(states, caution)
     N, m = len(states), system.coefficients.shape[2] - system.size
     place = np.array(states, dtype=np.intp).reshape(N, 2)
-    rate, motion = derivatives[place[:, 1] + 1, place[:, 0]], derivatives[0]
-    A, X = rate[:, :N] + 0.0, motion[:, :N]
-    B, shift = absorbed(A, _column_parts(rate, N, m))
-    U = [part.copy() for part in _column_parts(motion, N, m)]
-    for k, part in enumerate(shift):
+    rate, motion = derivatives.at(place[:, 1] + 1, place[:, 0]), derivatives.at(0, np.arange(system.size))
+    A, X = rate.value[:, :N] + 0.0, motion.value[:, :N]
+    B, shift = absorbed(A, _column_parts(rate.value, N, m))
+    U = [part.copy() for part in _column_parts(motion.value, N, m)]
+    errors = _column_parts(np.sqrt(motion.square), N, m)
+    for k, (part, error) in enumerate(zip(shift, _errors_of_shift(rate, shift), strict=True)):
         U[k] += X @ part
+        errors[k] = errors[k] + np.abs(X) @ error + np.sqrt(motion.square[:, :N]) @ np.abs(part)
     displacement = Signal(X, trimmed(tuple(U)))
     equations = StateEquations(A=A, B=B + 0.0, displacement=displacement, shift=trimmed(shift))
-    return Realization(states=states, equations=equations, rcond=rcond)
+    return Realization(states=states, equations=equations, errors=tuple(errors), rcond=rcond)
 
 
 def in_model_units(realization: Realization, units: Units) -> StateEquations:
@@ -109,16 +118,19 @@ def rounding_in_model_units(realization: Realization, units: Units, columns: Flo
         In scaled units.
     units : Units
     columns : (m,) ndarray
-        How large the response to each input is in scaled units: its coefficients are known to a part of that.
+        How large the response to each input is in scaled units: its coefficients are known to a part of that, or to
+        a multiple of the errors that (18) has followed where that is less.
     relative : float
         That part.
     """
     scaled = realization.equations
     q = scaled.displacement
+    known = [np.minimum(columns, CERTAIN / relative * error) for error in realization.errors]
+    sizes_of_inputs = tuple([np.maximum(np.abs(part), size) for part, size in zip(q.U, known, strict=False)])
     sizes = StateEquations(
         A=np.abs(scaled.A),
         B=np.maximum(np.abs(scaled.B), np.abs(scaled.B).max(axis=0, initial=0.0)),
-        displacement=Signal(np.abs(q.X), tuple([np.maximum(np.abs(part), columns) for part in q.U])),
+        displacement=Signal(np.abs(q.X), sizes_of_inputs),
         shift=(),
     )
     result = in_model_units(replace(realization, equations=sizes), units)
@@ -158,7 +170,7 @@ class _Chain:
         ]
         return tuple([(j, order) for order, j in sorted(found)])
 
-    def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[FloatArray, float]:
+    def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[_Uncertain, float]:
         """Give q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u."""
         c, d = self.offsets.equations, self.offsets.unknowns
         n, N = self.system.size, len(states)
@@ -175,7 +187,7 @@ class _Chain:
                 found.value[d[columns] - level, columns] = solution.value
                 found.square[d[columns] - level, columns] = solution.square
                 rcond = min(rcond, condition)
-        return found.value, rcond
+        return found, rcond
 
     def _right_side(self, rows: IndexArray, level: int, found: _Uncertain, N: int) -> _Uncertain:
         """Everything in (18) but the unknowns that are to be found, which `found` still holds as zeros."""
@@ -227,3 +239,16 @@ def _rescaled(signal: Signal, states: FloatArray, units: Units) -> Signal:
 def _column_parts(values: FloatArray, first: int, width: int) -> list[FloatArray]:
     """Split the columns from `first` on into parts of one width."""
     return [values[:, k : k + width] for k in range(first, values.shape[1], width)]
+
+
+def _errors_of_shift(rate: _Uncertain, shift: tuple[FloatArray, ...]) -> list[FloatArray]:
+    """Follow the mean rounding errors of x' = A x + B_0 u + B_1 u' + ... into E_0, E_1, ... of (5)."""
+    if not shift:
+        return []
+    N, m = len(rate.value), shift[0].shape[1]
+    A, dA = np.abs(rate.value[:, :N]), np.sqrt(rate.square[:, :N])
+    driven = _column_parts(np.sqrt(rate.square), N, m)
+    errors = [driven[-1]]
+    for k in reversed(range(1, len(driven) - 1)):
+        errors.append(driven[k] + A @ (errors[-1] + EPS * np.abs(shift[k])) + dA @ np.abs(shift[k]))
+    return errors[::-1]

@@ -20,11 +20,12 @@ from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
-from halfdof_ctrl.spectrum import balanced, balanced_states
+from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
 NOISE = 30.0  #: ... and below this times the error that was measured
+TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -97,14 +98,12 @@ def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
 def loss(model: SecondOrderModel, equations: StateEquations) -> float:
     """Measure what state equations, from whatever road, lose against direct solves."""
     _, units, pencil = _scaled(model)
-    A, states = balanced_states(np.asarray(equations.A / units.time))
-    q = equations.displacement
-    across, down = units.inputs / units.columns[:, None], 1.0 / units.columns[:, None]
+    q, across = equations.displacement, units.inputs / units.columns[:, None]
     scaled = StateEquations(
-        A=A,
-        B=equations.B / states[:, None] * units.inputs / units.time,
+        A=np.asarray(equations.A / units.time),
+        B=equations.B * units.inputs / units.time,
         displacement=Signal(
-            q.X * states * down, tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
+            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
         ),
         shift=(),
     )
@@ -113,7 +112,14 @@ def loss(model: SecondOrderModel, equations: StateEquations) -> float:
 
 def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
     system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-    return system, units, ScaledPencil(system.matrix, system.coefficients[:, :, system.size :])
+    powers = np.arange(3)[:, None, None]
+    pencil = ScaledPencil(
+        P=system.matrix,
+        B=system.coefficients[:, :, system.size :],
+        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
+        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+    )
+    return system, units, pencil
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
@@ -160,7 +166,7 @@ def _in_model_units(
     pencil: ScaledPencil,
 ) -> Deflated:
     losses = pencil.losses(result.equations)
-    known_to = np.maximum(losses.size, NOISE / ROUNDING * losses.error)
+    known_to = np.maximum(losses.size, NOISE / ROUNDING * np.minimum(losses.error, TRUSTED * losses.size))
     return Deflated(
         selection=StateSelection(
             dofs=model.dofs,
@@ -212,8 +218,8 @@ def _uncertain_error(
     rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
     msg = (
         f"No decision about ranks gives state equations with the spectrum of P(s): to working precision {rest}. The "
-        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, dampers, "
-        f"springs and constraints for entries that nearly cancel, or pass {'tol' if tol is None else 'another tol'} to "
-        "say which count as zero."
+        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, "
+        "dampers, springs and constraints for entries that nearly cancel, or pass "
+        f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)

@@ -71,8 +71,8 @@ class StateFeedback:
         """
         if self.reduction.shift:
             msg = (
-                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (by Bv, "
-                "Ba or a constraint): the closed loop is no second-order model of the same form. Use `closed_loop`."
+                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (by "
+                "Bv, Ba or a constraint): the closed loop is no second-order model of the same form. Use `closed_loop`."
             )
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K

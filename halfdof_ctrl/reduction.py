@@ -425,8 +425,8 @@ def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
         _warn_of_lost_digits(result.loss, result.rcond)
     else:
         msg = (
-            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not that "
-            "of this model but of one that differs from it by as much. Pass a smaller tol, unless that is what you want."
+            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
+            "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return ExactReduction(

@@ -101,7 +101,7 @@ class Relaxed:
 
 
 def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
-    """Scale coefficients (3, n, n) and (3, n, m) by powers of two near the unit-free scaling, and inputs to near one."""
+    """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
     row_logs, column_logs, time_log = logarithmic_scaling(P)
     row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
     speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]

@@ -12,6 +12,7 @@ from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.leading import LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.partition import DofPartition
+from halfdof_ctrl.scaling import logarithmic_scaling
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
 ROUNDING = 32 * np.finfo(float).eps  #: times n: what a solution of (3) is known to, of its largest scaled unknown
@@ -54,11 +55,13 @@ def rounding_of_solve(
 ) -> Rounding:
     """Bound the rounding errors of (3) and (5).
 
-    An input's column in the solution of (3) is known to 32 n eps of its largest entry, measured in the scaled unknowns.
+    An input's column in the solution of (3) is known to 32 n eps of its largest entry, measured in unknowns that are
+    scaled to be the same in any units.
     """
     A = np.abs(equations.A)
+    row_logs, _, _ = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
+    scale = 1.0 / np.abs(np.exp2(row_logs)[:, None] * leading_columns(model, partition)).max(axis=0)
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
-    scale = np.ones(len(model.dofs)) if leading.columns is None else leading.columns
     known_to = np.abs(partition.T) if partition.sizes is None else partition.sizes
     rates, statics = [], []
     for force in (model.B, model.Bv, model.Ba):
