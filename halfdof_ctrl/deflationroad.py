@@ -5,7 +5,7 @@ does not, or where a pencil is called singular whose P(s) is not, the decisions 
 caution about rounding errors. If none passes, the model is refused.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -19,7 +19,7 @@ from halfdof_ctrl.names import derivative_name, listed
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
-from halfdof_ctrl.signals import Rounding, StateEquations
+from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
@@ -86,13 +86,40 @@ class Deflated:
     rounding: Rounding
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
     loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
+    certified: bool  #: whether (19) holds, as it need not where `tol` was given
 
 
 def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
     """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    system, units = _scaled(model)
-    pencil = _scaled_pencil(model, system, units)
+    _, units, pencil = _scaled(model)
     return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
+
+
+def loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Measure what state equations, from whatever road, lose against direct solves."""
+    _, units, pencil = _scaled(model)
+    q, across = equations.displacement, units.inputs / units.columns[:, None]
+    scaled = StateEquations(
+        A=np.asarray(equations.A / units.time),
+        B=equations.B * units.inputs / units.time,
+        displacement=Signal(
+            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
+        ),
+        shift=(),
+    )
+    return pencil.losses(scaled).worst
+
+
+def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
+    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    powers = np.arange(3)[:, None, None]
+    pencil = ScaledPencil(
+        P=system.matrix,
+        B=system.coefficients[:, :, system.size :],
+        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
+        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+    )
+    return system, units, pencil
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
@@ -104,7 +131,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
         A real model.
     tol : float, optional
         Singular values of a scaled block at most `tol` times its largest count as zero; by default what rounding
-        makes. With it the result is not certified, since it belongs to another model.
+        makes. With it the result need not pass (19), since it belongs to another model.
 
     Raises
     ------
@@ -113,8 +140,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    system, units = _scaled(model)
-    pencil = _scaled_pencil(model, system, units)
+    system, units, pencil = _scaled(model)
     decisions: tuple[BlockDecision, ...] = ()
     for caution in CAUTIONS:
         relaxation = relaxed(system, caution, tol)
@@ -124,23 +150,11 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
                 raise _singular_error(model, pencil)
             continue
         result = realized(relaxation.system, relaxation.offsets, caution)
-        if tol is not None or pencil.has_spectrum(result.equations.A):
-            return _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-    raise _uncertain_error(model, decisions)
-
-
-def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units]:
-    return scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-
-
-def _scaled_pencil(model: SecondOrderModel, system: RowSystem, units: Units) -> ScaledPencil:
-    speed = (units.time ** np.arange(3.0))[:, None, None]
-    return ScaledPencil(
-        P=system.matrix,
-        B=system.coefficients[:, :, system.size :],
-        F=np.stack([model.F, model.G, model.H]) * units.columns * speed,
-        D=np.stack([model.D, model.Dv, model.Da]) * speed,
-    )
+        certified = pencil.has_spectrum(result.equations.A)
+        if certified or tol is not None:
+            found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
+            return replace(found, certified=certified)
+    raise _uncertain_error(model, decisions, tol)
 
 
 def _in_model_units(
@@ -166,6 +180,7 @@ def _in_model_units(
         rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
         rcond=result.rcond,
         loss=losses.worst,
+        certified=True,
     )
 
 
@@ -186,20 +201,25 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
     equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
     msg = (
-        f"The pencil is singular: det P(s) vanishes at every s. DOFs {listed(unknowns)} can move in any way without a "
-        f"force, and the equations of {listed(equations)} depend on each other."
+        f"The pencil is singular: det P(s) vanishes at every s, to working precision. DOFs {listed(unknowns)} can move "
+        f"in any way without a force, and the equations of {listed(equations)} depend on each other: a node without "
+        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant "
+        "or give it a stiffness."
     )
-    return SingularPencilError(msg, dofs=unknowns)
+    return SingularPencilError(msg, dofs=unknowns, equations=equations)
 
 
-def _uncertain_error(model: SecondOrderModel, decisions: tuple[BlockDecision, ...]) -> UncertainRankError:
+def _uncertain_error(
+    model: SecondOrderModel, decisions: tuple[BlockDecision, ...], tol: float | None
+) -> UncertainRankError:
     closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
+    rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
     msg = (
-        "No decision about ranks gives state equations with the spectrum of P(s): the model is singular or of another "
-        f"order to working precision. The closest decision is about DOFs {listed(dofs)} (singular values "
-        f"{gap:.1e} apart). Check their masses, dampers, springs and constraints for entries that nearly cancel, or "
-        "pass tol to say which count as zero."
+        f"No decision about ranks gives state equations with the spectrum of P(s): to working precision {rest}. The "
+        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, "
+        "dampers, springs and constraints for entries that nearly cancel, or pass "
+        f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)

@@ -131,18 +131,20 @@ def require_regular(model: SecondOrderModel) -> None:
         s = gamma * point
         P = model.K + s * model.C + s**2 * model.M
         rows, columns = equilibrating_powers(np.abs(P))
-        _, values, right = scipy.linalg.svd(P * rows[:, None] * columns)
+        left, values, right = scipy.linalg.svd(P * rows[:, None] * columns)
         if values[-1] > RANK_TOLERANCE * values.size * values[0]:
             return
-    null = np.abs(right[-1])
-    dofs = tuple([model.dofs[index] for index in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
+    dofs, equations = (
+        tuple([model.dofs[index] for index in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
+        for null in (np.abs(right[-1]), np.abs(left[:, -1]))
+    )
     msg = (
         f"The pencil is singular: det P(s) vanishes at every s (smallest singular value {values[-1]:.1e} of "
-        f"{values[0]:.1e} after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node "
-        "without spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is "
-        "redundant or give it a stiffness."
+        f"{values[0]:.1e} after scaling). DOFs {listed(dofs)} can move together in any way without a force, and the "
+        f"equations of {listed(equations)} depend on each other: a node without spring, damper or mass, a constraint "
+        "that stands twice, or two identical equations. Remove what is redundant or give it a stiffness."
     )
-    raise SingularPencilError(msg, dofs=dofs)
+    raise SingularPencilError(msg, dofs=dofs, equations=equations)
 
 
 def _quadratic_pencil(coefficients: Sequence[Matrix]) -> tuple[FinitePart, float]:

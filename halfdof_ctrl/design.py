@@ -66,13 +66,13 @@ class StateFeedback:
         Raises
         ------
         WeightError
-            Derivatives of the inputs act on the model (`Bv`, `Ba`), so that the state is not a function of
-            q and q' alone.
+            Derivatives of the inputs act on the model (by `Bv`, `Ba` or a constraint), so that the state is not a
+            function of q and its derivatives alone; or a state is a third or higher derivative of a DOF.
         """
         if self.reduction.shift:
             msg = (
-                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (Bv, "
-                "Ba): the closed loop is no second-order model of the same form. Use `closed_loop`."
+                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (by "
+                "Bv, Ba or a constraint): the closed loop is no second-order model of the same form. Use `closed_loop`."
             )
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K

@@ -72,11 +72,15 @@ class SingularLeadingMatrixError(HalfdofError):
 
 
 class SingularPencilError(HalfdofError):
-    """``det P(s)`` vanishes identically: `dofs` can move in any way without a force."""
+    """``det P(s)`` vanishes identically.
 
-    def __init__(self, message: str, *, dofs: tuple[str, ...]) -> None:
+    `dofs` can move in any way without a force, and the equations (rows) of `equations` depend on each other.
+    """
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...], equations: tuple[str, ...]) -> None:
         super().__init__(message)
         self.dofs = dofs
+        self.equations = equations
 
 
 class UncertainRankError(HalfdofError):

@@ -11,7 +11,7 @@ needs no mixing stays the DOF that it was. Derivation: docs/explanation/reductio
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
@@ -192,6 +192,12 @@ def mass_ratios(model: SecondOrderModel) -> FloatArray:
     rows, columns = equilibrating_factors(K + gamma * C + gamma**2 * M, even=2.0)
     mass = (M * rows[:, None] * columns).max(axis=0)
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
+
+
+def without_light_masses(model: SecondOrderModel, tol: float) -> SecondOrderModel:
+    """Take the mass from the DOFs whose `mass_ratios` are at most `tol`."""
+    light = model.M.any(axis=0) & (mass_ratios(model) <= tol)
+    return replace(model, M=read_only(np.where(light, 0.0, model.M))) if light.any() else model
 
 
 def _own_speeds(model: SecondOrderModel) -> FloatArray:

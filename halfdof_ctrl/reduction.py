@@ -24,7 +24,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum
+from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum, loss
 from halfdof_ctrl.errors import (
     CloseDecisionWarning,
     ComplexModelError,
@@ -38,7 +38,13 @@ from halfdof_ctrl.leading import SINGULAR, LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.outputs import output_signal, without_rounding
-from halfdof_ctrl.partition import DofPartition, RankDecision, orthonormal_bases, select_columns
+from halfdof_ctrl.partition import (
+    DofPartition,
+    RankDecision,
+    orthonormal_bases,
+    select_columns,
+    without_light_masses,
+)
 from halfdof_ctrl.recovery import RecoveredMotion, TimeResponse, forward_slope, given_values, require_consistent
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
@@ -50,6 +56,7 @@ ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
+LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves
 LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
 
@@ -66,6 +73,7 @@ class ExactReduction:
     equations: StateEquations  #: A, B and the way back to q
     rcond: float  #: reciprocal condition number of W, or the smallest of the systems (18), on which the states rest
     known_rounding: Rounding | None = None  #: rounding errors of the equations, where the road has followed them
+    tol: float | None = None  #: what `exact_reduction` was given
 
     @property
     def A(self) -> FloatArray:  # noqa: N802
@@ -282,8 +290,8 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         A real model with n DOFs.
     tol : float, optional
         Size of a mass, relative to the largest in scaled units, up to which it counts as none
-        (see `partition.select_columns` and `partition.orthonormal_bases`). By default only exact
-        zeros and rounding count as none.
+        (see `partition.select_columns` and `partition.orthonormal_bases`), and of singular values in
+        deflation. By default only exact zeros and rounding count as none.
     method : {"selection", "orthogonal", "deflation"}, optional
         Road to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
         deflation where they do too (index above one).
@@ -313,9 +321,11 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     NearlyMasslessWarning
         A mass is not zero but below 1e-10 of the others in scaled units.
     CloseDecisionWarning
-        A decision about a rank rests on singular values less than 1e3 apart.
+        A decision about a rank rests on singular values less than 1e3 apart, or W is hardly regular, or `tol`
+        is so large that deflation gives the state space of another model.
     LostDigitsWarning
-        After deflation, A and B lose more than 1e-8 of the largest entry of the transfer function.
+        A and B lose more than 1e-8 of the largest entry of the transfer function, because W, or J after
+        deflation, is ill conditioned.
 
     Notes
     -----
@@ -363,7 +373,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
         W = leading_columns(model, partition)
         leading = LeadingMatrix.factorized(W)
         if not leading.is_singular:
-            reduction = _reduced(model, partition, leading)
+            reduction = _reduced(model, partition, leading, tol)
             sure = method == "selection" or tol is not None or leading.rcond > SURELY_REGULAR
             if sure or has_spectrum(model, reduction.A):
                 return _warned(reduction)
@@ -373,7 +383,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
     W = leading_columns(model, partition)
     leading = LeadingMatrix.factorized(W)
     if not leading.is_singular:
-        reduction = _reduced(model, partition, leading)
+        reduction = _reduced(model, partition, leading, tol)
         sure = method == "orthogonal" or tol is not None
         if sure or has_spectrum(model, reduction.A):  # bases of null spaces rest on rank decisions
             return _warned(reduction)
@@ -382,13 +392,16 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
     return None
 
 
-def _reduced(model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix) -> ExactReduction:
+def _reduced(
+    model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix, tol: float | None
+) -> ExactReduction:
     return ExactReduction(
         model=model,
         partition=partition,
         leading=leading,
         equations=solved_at_once(model, partition, leading),
         rcond=leading.rcond,
+        tol=tol,
     )
 
 
@@ -401,19 +414,22 @@ def _warned(reduction: ExactReduction) -> ExactReduction:
             "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    if reduction.rcond < LOSS_SUSPECTED and reduction.tol is None:
+        _warn_of_lost_digits(loss(reduction.model, reduction.equations), reduction.rcond)
     return reduction
 
 
 def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
-    result = deflated(model, tol)
-    _warn_of_close_decisions(result.selection.evidence)
-    if result.loss > LOST:
+    result = deflated(model if tol is None else without_light_masses(model, tol), tol)
+    if result.certified:
+        _warn_of_close_decisions(result.selection.evidence)
+        _warn_of_lost_digits(result.loss, result.rcond)
+    else:
         msg = (
-            f"The state space is exact, but A and B in double precision lose {result.loss:.1e} of the largest entry of "
-            "the transfer function: the remaining equations are ill conditioned "
-            f"(reciprocal condition number {result.rcond:.1e}). descriptor_response keeps the digits."
+            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
+            "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
         )
-        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return ExactReduction(
         model=model,
         partition=result.selection,
@@ -421,7 +437,18 @@ def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
         equations=result.equations,
         rcond=result.rcond,
         known_rounding=result.rounding,
+        tol=tol,
     )
+
+
+def _warn_of_lost_digits(lost: float, rcond: float) -> None:
+    if lost > LOST:
+        msg = (
+            f"The state space is exact, but A and B in double precision lose {lost:.1e} of the largest entry of the "
+            "transfer function: the equations for the highest derivatives are ill conditioned "
+            f"(reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
+        )
+        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
 
 
 def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
@@ -443,7 +470,7 @@ def _index(reduction: ExactReduction) -> int:
     With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass, the
     transfer function grows as the inverse of (8) does.
     """
-    model = reduction.model
+    model = reduction.model if reduction.tol is None else without_light_masses(reduction.model, reduction.tol)
     unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
     probe = replace(
         model,
@@ -457,7 +484,7 @@ def _index(reduction: ExactReduction) -> int:
         Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
         Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
     )
-    result = deflated(probe)
+    result = deflated(probe, reduction.tol)
     grown = output_signal(probe, result.equations, lambda: result.rounding)
     return len(without_rounding(probe, grown, result.rounding).U)
 
@@ -479,7 +506,7 @@ def _singular_error(
         f"The leading matrix W = [M T_i, C T_c, K T_k] is singular to working precision (rcond {leading.rcond:.1e}, "
         f"by {partition.method}): the equations of motion do not determine the highest derivatives of DOFs "
         f"{listed(dofs)}. Either a rigid constraint or an algebraic loop of dampers or springs ties them (index "
-        "above one), or nothing resists their motion; pencil_structure tells which. Give them the mass, damper or "
-        "spring that the model left out, or eliminate the constraint."
+        "above one), or nothing resists their motion; pencil_structure tells which. Leave method out, so that "
+        "deflation is tried, or give them the mass, damper or spring that the model left out."
     )
     return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)

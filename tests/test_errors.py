@@ -35,7 +35,7 @@ EXAMPLES: list[HalfdofError] = [
     SignalNameError("no such name", names=("a",)),
     ParameterError("m = -1", parameter="m", value=-1.0),
     SingularLeadingMatrixError("W is singular", dofs=("a", "b"), rcond=1e-18),
-    SingularPencilError("floats", dofs=("a",)),
+    SingularPencilError("floats", dofs=("a",), equations=("b",)),
     UncertainRankError("close", dofs=("a",), gap=2.0),
     ImproperError("grows", pairs=(("u", "y", 2),)),
     InconsistentStateError("contradicts", names=("a",), given=(1.0,), required=(2.0,)),
