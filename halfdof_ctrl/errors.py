@@ -70,11 +70,16 @@ class SingularLeadingMatrixError(HalfdofError):
 
 
 class SingularPencilError(HalfdofError):
-    """``det P(s)`` vanishes identically: `dofs` can move in any way without a force."""
+    """``det P(s)`` vanishes identically.
 
-    def __init__(self, message: str, *, dofs: tuple[str, ...]) -> None:
+    `dofs` can move in any way without a force, and `equations` depend on each other. An equation is named by the DOF
+    whose row of M, C, K it is: the equation of motion of a displacement, the constraint of a multiplier.
+    """
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...], equations: tuple[str, ...] = ()) -> None:
         super().__init__(message)
         self.dofs = dofs
+        self.equations = equations
 
 
 class ImproperError(HalfdofError):
@@ -139,3 +144,7 @@ def callers_level() -> int:
 
 class NearlyMasslessWarning(UserWarning):
     """A DOF has a mass so small against the others that its two states cost digits."""
+
+
+class UncertainRankWarning(UserWarning):
+    """A count rests on a rank that is hardly to be told from rounding."""
