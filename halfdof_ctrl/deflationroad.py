@@ -11,13 +11,15 @@ from typing import Literal
 import numpy as np
 
 from halfdof_ctrl.arrays import FloatArray
-from halfdof_ctrl.certificate import ScaledPencil
+from halfdof_ctrl.certificate import NEAR, ScaledPencil
 from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
+from halfdof_ctrl.nullspaces import causes, null_spaces
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
+from halfdof_ctrl.refusals import singular_pencil_error
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.spectrum import balanced
@@ -199,14 +201,13 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 
 
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
-    equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
-    msg = (
-        f"The pencil is singular: det P(s) vanishes at every s, to working precision. DOFs {listed(unknowns)} can move "
-        f"in any way without a force, and the equations of {listed(equations)} depend on each other: a node without "
-        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant "
-        "or give it a stiffness."
+    null = null_spaces(pencil.at(NEAR[0])[0])
+    return singular_pencil_error(
+        dofs=_names(model, np.array(sorted(frozenset().union(*null.unknowns)), dtype=np.intp)),
+        equations=_names(model, np.array(sorted(frozenset().union(*null.equations)), dtype=np.intp)),
+        fact="to working precision",
+        causes=causes(null, (model.K, model.C, model.M), model.dofs),
     )
-    return SingularPencilError(msg, dofs=unknowns, equations=equations)
 
 
 def _uncertain_error(
