@@ -20,10 +20,12 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.errors import SingularPencilError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.pencils import RANK_TOLERANCE, FinitePart, balancing_powers, equilibrating_powers, finite_part
+from halfdof_ctrl.sparseregular import require_regular_sparse
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where det P(s) is looked at, in units of the time scale
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
@@ -61,6 +63,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     >>> structure.finite_eigenvalues.real.round(12).tolist(), structure.n_infinite
     ([-2.0], 1)
     """
+    model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
     part, scale = _quadratic_pencil((model.K, model.C, model.M))
     finite = _sorted(part.eigenvalues * scale)
     return PencilStructure(
@@ -103,6 +106,7 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     >>> zeros(mechss([[1]], [[2]], [[3]], [[1]], G=[[1]]))
     array([0.+0.j])
     """
+    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
     require_regular(model)
     blocks = [
         np.block([[P, -B], [F, D]])
@@ -126,6 +130,9 @@ def require_regular(model: SecondOrderModel) -> None:
     SingularPencilError
         ``P(s)`` is singular to working precision at three generic points.
     """
+    if model.is_sparse:
+        require_regular_sparse(model)
+        return
     gamma = typical_frequency(model)
     for point in GENERIC_POINTS:
         s = gamma * point

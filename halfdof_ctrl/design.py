@@ -24,6 +24,7 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.cost import Cost, Weights, given_cost, physical_cost
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.errors import StabilizationError, WeightError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
@@ -157,6 +158,7 @@ def lqr(
     [[1.0, 1.414214]]
     """
     physical = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+    model = dense_copy(model, "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R).")
     reduction = exact_reduction(model)
     if reduction.order == 0:
         msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."

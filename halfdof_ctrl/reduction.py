@@ -22,15 +22,25 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
-from halfdof_ctrl.errors import ComplexModelError, InconsistentStateError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.arrays import LARGEST_DENSE_COPY, FloatArray, is_zero, read_only, unit_matrix
+from halfdof_ctrl.errors import (
+    ComplexModelError,
+    InconsistentStateError,
+    ModelSizeError,
+    ParameterError,
+    SingularLeadingMatrixError,
+)
 from halfdof_ctrl.leading import LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.partition import DofPartition, orthonormal_bases, select_columns
 from halfdof_ctrl.recovery import RecoveredMotion, TimeResponse, forward_slope, given_values, require_consistent
 from halfdof_ctrl.scaling import equilibrating_factors
-from halfdof_ctrl.signals import Signal, trimmed
+from halfdof_ctrl.signals import Signal, absorbed, trimmed
+from halfdof_ctrl.sparsedisplacement import SparseDisplacement
+from halfdof_ctrl.sparselu import SparseLU
+from halfdof_ctrl.sparsepartition import SparsePartition
+from halfdof_ctrl.sparsereduction import sparse_reduction
 
 Road: TypeAlias = Literal["selection", "orthogonal"]
 
@@ -45,11 +55,11 @@ class ExactReduction:
     """
 
     model: SecondOrderModel  #: the model that was reduced
-    partition: DofPartition  #: which coordinates are inertial, half and static
-    leading: LeadingMatrix  #: W of equation (2), factorized
+    partition: DofPartition | SparsePartition  #: which coordinates are inertial, half and static
+    leading: LeadingMatrix | SparseLU  #: W of equation (2), factorized
     A: FloatArray  #: (N, N) of x = (p_i, p_c, p'_i)
     B: FloatArray  #: (N, m)
-    displacement: Signal  #: all n displacements, equation (4)
+    displacement: Signal | SparseDisplacement  #: all n displacements, equation (4)
     shift: tuple[FloatArray, ...]  #: E_0, E_1 of equation (5), (N, m) each; empty unless Bv or Ba is there
 
     @property
@@ -94,8 +104,14 @@ class ExactReduction:
         return (*self.partition.inertial, *self.partition.half, *motion_names(self.partition.inertial, 1))
 
     def motion(self, derivative: int) -> Signal:
-        """Give q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
-        signal = self.displacement
+        """Give q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs.
+
+        Raises
+        ------
+        ModelSizeError
+            A sparse model with so many DOFs and states that this is too large.
+        """
+        signal = self.displacement.whole() if isinstance(self.displacement, SparseDisplacement) else self.displacement
         for _ in range(derivative):
             signal = signal.derivative(self.A, self.B)
         return signal
@@ -141,8 +157,12 @@ class ExactReduction:
         if self.shift:
             x = x - self.shift[0] @ u
         for derivative, given in enumerate((q, v)):
-            motion = self.motion(derivative)
-            required = motion.X @ x + motion.direct(u.size) @ u
+            if isinstance(self.displacement, SparseDisplacement):
+                at_rest = [np.zeros((u.size, 1))] * 3
+                required = self.displacement.motion_at(x[:, None], [u[:, None], *at_rest], derivative)[:, 0]
+            else:
+                motion = self.motion(derivative)
+                required = motion.X @ x + motion.direct(u.size) @ u
             require_consistent(motion_names(model.dofs, derivative), given, required)
         return x
 
@@ -172,6 +192,9 @@ class ExactReduction:
             )
             raise InconsistentStateError(msg, names=self.states, given=(), required=())
         time = np.asarray(response.t, dtype=float)
+        if isinstance(self.displacement, SparseDisplacement):
+            displacement, velocity = self.displacement.histories(x, u, time)
+            return RecoveredMotion(time=time, displacement=displacement, velocity=velocity, dofs=self.model.dofs)
         slopes = [u]
         histories = []
         for derivative in range(2):
@@ -196,6 +219,8 @@ class ExactReduction:
         )
 
     def _inverse_rows(self) -> FloatArray:
+        if isinstance(self.displacement, SparseDisplacement):
+            return self.displacement.inverse_rows()
         return self.leading.solve(np.eye(len(self.model.dofs)))
 
 
@@ -242,6 +267,12 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     """
     if model.is_complex:
         raise complex_model_error(model)
+    _require_options(tol, method)
+    if model.is_sparse:
+        reduced = _sparsely_reduced(model, tol, method)
+        if reduced is not None:
+            return reduced
+        model = model.as_dense()
     partition, leading = _partitioned(model, tol, method)
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     m, N = model.B.shape[1], moving + n_i
@@ -258,7 +289,7 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     rate[moving:] = solved[:n_i]
     rate += 0.0  # leaves no negative zeros to be printed
     A = rate[:, :N]
-    B, shift = _absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
+    B, shift = absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     return ExactReduction(
         model=model,
         partition=partition,
@@ -281,14 +312,37 @@ def complex_model_error(model: SecondOrderModel) -> ComplexModelError:
     return ComplexModelError(msg, matrices=letters)
 
 
-def _partitioned(model: SecondOrderModel, tol: float | None, method: Road | None) -> tuple[DofPartition, LeadingMatrix]:
-    """Take the first road whose W is nonsingular."""
+def _require_options(tol: float | None, method: Road | None) -> None:
     if method not in (None, "selection", "orthogonal"):
         msg = f"method must be 'selection', 'orthogonal' or None, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
     if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):
         msg = f"tol = {tol!r}, but it is a relative size: a number from 0 to below 1, such as 1e-12."
         raise ParameterError(msg, parameter="tol", value=tol)
+
+
+def _sparsely_reduced(model: SecondOrderModel, tol: float | None, method: Road | None) -> ExactReduction | None:
+    """Reduce a sparse model; None where W is singular but the model small enough for the dense roads."""
+    try:
+        parts = sparse_reduction(model, tol, method)
+    except (SingularLeadingMatrixError, ModelSizeError):
+        sizes = len(model.dofs), len(model.inputs), len(model.outputs)
+        if method is None and max(sizes) <= LARGEST_DENSE_COPY:
+            return None
+        raise
+    return ExactReduction(
+        model=model,
+        partition=parts.partition,
+        leading=parts.leading,
+        A=read_only(parts.A),
+        B=read_only(parts.B),
+        displacement=parts.displacement,
+        shift=parts.shift,
+    )
+
+
+def _partitioned(model: SecondOrderModel, tol: float | None, method: Road | None) -> tuple[DofPartition, LeadingMatrix]:
+    """Take the first road whose W is nonsingular."""
     if method != "orthogonal":
         partition = select_columns(model, tol)
         W = _leading_columns(model, partition)
@@ -313,16 +367,6 @@ def _leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatA
     W[:, n_i:moving] = partition.times_basis(model.C, n_i, moving)
     W[:, moving:] = partition.times_basis(model.K, moving, None)
     return W
-
-
-def _absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
-    """Turn x' = A x + B_0 u + B_1 u' + B_2 u'' into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u', (5)."""
-    shift: tuple[FloatArray, ...] = ()
-    carried = driven[-1]
-    for lower in reversed(driven[:-1]):
-        shift = (carried, *shift)
-        carried = lower + A @ carried
-    return carried, shift
 
 
 def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tuple[FloatArray, ...]) -> Signal:

@@ -2,6 +2,8 @@
 
 w = X x + U_0 u + U_1 u' + U_2 u'' + ...,    x' = A x + B u                            (6)
 w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                            (7)
+
+Derivatives of the inputs in the equation of the state are absorbed by another choice of it, equation (5).
 """
 
 from dataclasses import dataclass
@@ -42,6 +44,16 @@ def trimmed(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
     while parts and is_zero(parts[-1]):
         parts = parts[:-1]
     return parts
+
+
+def absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Turn x' = A x + B_0 u + B_1 u' + B_2 u'' into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u', (5)."""
+    shift: tuple[FloatArray, ...] = ()
+    carried = driven[-1]
+    for lower in reversed(driven[:-1]):
+        shift = (carried, *shift)
+        carried = lower + A @ carried
+    return carried, shift
 
 
 def _sum(mine: FloatArray | None, theirs: FloatArray | None) -> FloatArray:

@@ -10,7 +10,6 @@ from itertools import zip_longest
 
 import control
 import numpy as np
-import numpy.typing as npt
 
 from halfdof_ctrl.arrays import FloatArray, is_zero, unit_matrix
 from halfdof_ctrl.errors import ImproperError, SignalNameError
@@ -18,20 +17,23 @@ from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.signals import Signal, trimmed
+from halfdof_ctrl.sparsearrays import MatrixLike
+from halfdof_ctrl.sparsedisplacement import SparseDisplacement
+from halfdof_ctrl.sparsepartition import SparsePartition
 
 ROUNDING = 32 * np.finfo(float).eps  #: times n: a coefficient of u' below this part of its terms is rounding
 
 
 def mech2ss(
-    model: SecondOrderModel | ExactReduction | npt.ArrayLike | None,
-    C: npt.ArrayLike | None = None,
-    K: npt.ArrayLike | None = None,
-    B: npt.ArrayLike | None = None,
-    F: npt.ArrayLike | None = None,
-    G: npt.ArrayLike | None = None,
+    model: SecondOrderModel | ExactReduction | MatrixLike | None,
+    C: MatrixLike | None = None,
+    K: MatrixLike | None = None,
+    B: MatrixLike | None = None,
+    F: MatrixLike | None = None,
+    G: MatrixLike | None = None,
     *,
-    H: npt.ArrayLike | None = None,
-    D: npt.ArrayLike | None = None,
+    H: MatrixLike | None = None,
+    D: MatrixLike | None = None,
     dofs: Names = None,
     inputs: Names = None,
     outputs: Names = None,
@@ -81,7 +83,7 @@ def mech2ss(
             mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
         )
     output = output_signal(reduction)
-    if len(output.U) > 1:
+    if len(output.U) > 1 and not isinstance(reduction.displacement, SparseDisplacement):
         output = _without_rounding(reduction, output)
     if len(output.U) > 1:
         raise _improper_error(reduction.model, output)
@@ -126,6 +128,8 @@ def labelled_system(
 def output_signal(reduction: ExactReduction) -> Signal:
     """Give the outputs of the reduced model as functions of the state, the inputs and their derivatives."""
     model, q = reduction.model, reduction.displacement
+    if isinstance(q, SparseDisplacement):
+        return q.output(model)
     output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
     if not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(reduction.A, reduction.B))
@@ -163,7 +167,7 @@ def _sizes(reduction: ExactReduction) -> tuple[FloatArray, Signal]:
     part, model, A = reduction.partition, reduction.model, np.abs(reduction.A)
     n_i, moving = part.n_inertial, part.n_inertial + part.n_half
     scale = np.ones(len(model.dofs)) if reduction.leading.columns is None else reduction.leading.columns
-    known_to = np.abs(part.T) if part.sizes is None else part.sizes
+    known_to = np.abs(part.T) if part.sizes is None or isinstance(part, SparsePartition) else part.sizes
     rates, statics = [], []
     for force in (model.B, model.Bv, model.Ba):
         solution = np.abs(reduction.leading.solve(np.asfortranarray(force))) / scale[:, None]

@@ -13,6 +13,7 @@ from halfdof_ctrl.errors import (
     ImproperError,
     InconsistentStateError,
     MatrixError,
+    ModelSizeError,
     NearlyMasslessWarning,
     ParameterError,
     SignalNameError,
@@ -33,6 +34,7 @@ EXAMPLES: list[HalfdofError] = [
     InconsistentStateError("contradicts", names=("a",), given=(1.0,), required=(2.0,)),
     WeightError("negative", names=("a",)),
     StabilizationError("unstable", eigenvalue=1 + 2j, quantity="a"),
+    ModelSizeError("too many states", size=400_000, limit=8192),
     FileFormatError("truncated", path="model.npz"),
 ]
 
