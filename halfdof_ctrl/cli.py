@@ -40,13 +40,15 @@ from halfdof_ctrl.files import (
 from halfdof_ctrl.horizon import relevant_poles, step_times
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.mounts import hydromount
-from halfdof_ctrl.names import motions
-from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.names import listed, motions
+from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
 from halfdof_ctrl.reduction import exact_reduction
 from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
 from halfdof_ctrl.response import DEFAULT_POINTS, default_frequencies, frequency_response
 from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.stepplot import MOST_RECOVERED
+from halfdof_ctrl.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.stiffnessplot import Scale
 
 PROGRAM = "halfdof-ctrl"
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
@@ -56,6 +58,7 @@ BUILT_IN = {"hydromount": hydromount}
 BUILT_IN_SIGNALS: dict[str, _Signals] = {
     "hydromount": (("F_y",), ("y", "y_dot"))
 }  #: what is shown unless the user asks for others
+BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
 FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
@@ -126,11 +129,25 @@ def _ss(arguments: argparse.Namespace) -> int:
 def _bode(arguments: argparse.Namespace) -> int:
     kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
     model = _model(arguments)
-    omega = _frequencies(model, arguments)
+    omega = _frequencies(lambda: default_frequencies(pencil_structure(model).finite_eigenvalues), arguments)
     if kind in TABLE_ENDINGS:
         save_response(frequency_response(model, omega), arguments.o)
     else:
         save_figure(bode_plot(model, omega, dB=arguments.db, Hz=arguments.hz, title=model.name), arguments.o)
+    return DONE
+
+
+def _stiffness(arguments: argparse.Namespace) -> int:
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    dof = _driven(model, arguments)
+    grid = functools.partial(motion_frequencies, [model], dof, free=True, linear=not arguments.log)
+    omega = _frequencies(grid, arguments, linear=not arguments.log)
+    if kind in TABLE_ENDINGS:
+        save_response(dynamic_stiffness_response(model, dof, grid() if omega is None else omega), arguments.o)
+    else:
+        scale: Scale = "log" if arguments.log else "linear"
+        save_figure(dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale), arguments.o)
     return DONE
 
 
@@ -201,6 +218,15 @@ def _model(arguments: argparse.Namespace) -> SecondOrderModel:
     return model.select(_listed(arguments.inputs, signals[0]), _listed(arguments.outputs, signals[1]))
 
 
+def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]:
+    """Give the DOFs that are moved: those asked for, that of the built-in model, or the only one."""
+    default = BUILT_IN_DOF.get(arguments.model, model.dofs[0] if len(model.dofs) == 1 else None)
+    if arguments.dof is None and default is None:
+        msg = f"--dof must name the DOF whose dynamic stiffness is meant: {listed(model.dofs)}."
+        raise ParameterError(msg, parameter="--dof", value=None)
+    return _listed(arguments.dof, [str(default)])
+
+
 def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
     known = list(inspect.signature(BUILT_IN[name]).parameters)
     parameters = _assignments(given, "-p")
@@ -240,22 +266,24 @@ def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
-def _frequencies(model: SecondOrderModel, arguments: argparse.Namespace) -> np.ndarray | None:
-    """Choose the frequencies [rad/s] if any of the limits or their number is given."""
+def _frequencies(
+    default: Callable[[], np.ndarray], arguments: argparse.Namespace, *, linear: bool = False
+) -> np.ndarray | None:
+    """Choose the frequencies [rad/s] if any of the limits or their number is given, the others from a default grid."""
     low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
     if low is None and high is None and points is None:
         return None
-    around = default_frequencies(pencil_structure(model).finite_eigenvalues)
+    around = default()
     low = around[0] if low is None else low
     high = around[-1] if high is None else high
-    if not (math.isfinite(high) and 0.0 < low < high):
+    if not (math.isfinite(high) and 0.0 <= low < high and (linear or low > 0.0)):
         msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
         raise ParameterError(msg, parameter="--omega-min", value=low)
     points = DEFAULT_POINTS if points is None else points
     if not FEWEST_POINTS <= points <= MOST_POINTS:
         msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
         raise ParameterError(msg, parameter="--points", value=points)
-    return np.geomspace(low, high, points)
+    return np.linspace(low, high, points) if linear else np.geomspace(low, high, points)
 
 
 def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
@@ -318,20 +346,29 @@ def _parser() -> argparse.ArgumentParser:
     add("info", _info, "print the model, its pencil and its reduction", None)
     add("ss", _ss, "print the state space, or write it (npz, mat)", "FILE")
     bode = add("bode", _bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
-    bode.add_argument("--omega-min", type=float, metavar="W", help="lowest frequency [rad/s]")
-    bode.add_argument("--omega-max", type=float, metavar="W", help="highest frequency [rad/s]")
-    bode.add_argument("--points", type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})")
+    _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
     bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
     step = add("step", _step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
     add("poles", _poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
+    what = "write the dynamic stiffness at a DOF and its loss angle over Hz (png, svg, pdf), or the numbers (csv)"
+    stiffness = add("stiffness", _stiffness, what, "FILE", needed=True, signals=False)
+    stiffness.add_argument("--dof", action="append", metavar="A,B", help="DOF that is moved; several move together")
+    _add_frequencies(stiffness)
+    stiffness.add_argument("--log", action="store_true", help="logarithmic axes and frequencies instead of linear ones")
     regulator = add("lqr", _lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
     for kind in WEIGHTS:
         regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
     regulator.add_argument("--energy", type=float, metavar="W", help="weight of the mechanical energy [1/J]")
     add("check", _check, "check the state space against the descriptor form; write the figures (json)", "FILE")
     return parser
+
+
+def _add_frequencies(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--omega-min", type=float, metavar="W", help="lowest frequency [rad/s]")
+    parser.add_argument("--omega-max", type=float, metavar="W", help="highest frequency [rad/s]")
+    parser.add_argument("--points", type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})")
 
 
 def _add_command(
@@ -342,6 +379,7 @@ def _add_command(
     target: str | None,
     *,
     needed: bool = False,
+    signals: bool = True,
 ) -> argparse.ArgumentParser:
     parser = commands.add_parser(
         name, help=purpose, description=f"{purpose[0].upper()}{purpose[1:]}.", allow_abbrev=False
@@ -349,8 +387,10 @@ def _add_command(
     parser.set_defaults(command=command)
     parser.add_argument("model", metavar="MODEL", help=f"a file (npz, mat) or a built-in model: {', '.join(BUILT_IN)}")
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
-    parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")
-    parser.add_argument("--outputs", action="append", metavar="A,B", help="outputs, as y, y_dot, y_ddot")
+    parser.set_defaults(inputs=None, outputs=None)
+    if signals:
+        parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")
+        parser.add_argument("--outputs", action="append", metavar="A,B", help="outputs, as y, y_dot, y_ddot")
     if target is not None:
         where = f"where to write; the ending of the {target.lower()} is its format" if target == "FILE" else "where"
         parser.add_argument("-o", metavar=target, required=needed, help=where)

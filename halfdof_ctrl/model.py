@@ -165,10 +165,10 @@ class SecondOrderModel:
             What the input is, named ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``. With displacements the DOFs leave
             the model; else they stay, with the equation ``q' = u`` or ``q'' = u`` in place of their own.
         inputs, outputs : str or sequence of str, optional
-            All signals of the new model, in order: the prescribed motions, the reactions ``R_<dof>``, and
-            whatever `select` finds in this model; motions of `dof` itself are direct terms then. By default the
-            motions and reactions, behind what `select` could not bring back from the new model: inputs
-            of this one that are no forces on DOFs, outputs that are no motions. Other inputs are zero.
+            All signals of the new model, in order: the new ones (motions, reactions ``R_<dof>``) and whatever
+            `select` finds in this model, motions of `dof` itself among them. By default the new ones alone,
+            behind what `select` could not bring back later: inputs that are no forces on DOFs (motions
+            prescribed before) and outputs that are no motions. Inputs that are left out are zero.
 
         Returns
         -------

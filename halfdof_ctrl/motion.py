@@ -40,7 +40,7 @@ from halfdof_ctrl.sparsearrays import has_sparse, joined_sparse
 
 MotionKind: TypeAlias = Literal["displacement", "velocity", "acceleration"]
 
-KINDS: tuple[MotionKind, ...] = get_args(MotionKind)  #: in the order of the derivative
+KINDS: tuple[MotionKind, ...] = get_args(MotionKind)  # in the order of the derivative
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

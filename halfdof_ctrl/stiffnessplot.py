@@ -1,6 +1,6 @@
 """Dynamic stiffness and loss angle, transmissibility and phase, over frequency as mount engineers read them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, TypeAlias, get_args
 
 import control
@@ -35,7 +35,7 @@ from halfdof_ctrl.stiffness import (
 )
 
 Scale: TypeAlias = Literal["linear", "log"]
-Models: TypeAlias = SecondOrderModel | Sequence[SecondOrderModel]
+Models: TypeAlias = SecondOrderModel | Iterable[SecondOrderModel]
 Labels: TypeAlias = str | Sequence[str] | None
 
 SCALES: tuple[Scale, ...] = get_args(Scale)
@@ -112,8 +112,9 @@ def dynamic_stiffness_plot(
     if omega is None:
         omega = motion_frequencies(models, dof, free=True, linear=xscale == "linear")
     responses = [dynamic_stiffness_response(model, dof, omega) for model in models]
-    axes, names = _prepared(ax, "modulus and loss angle"), as_tuple(dof)
+    names = as_tuple(dof)
     unit = _ratio_unit(models[0], units, force_names(names), names)
+    axes = _prepared(ax, "modulus and loss angle")
     lines = _draw(axes, responses, texts, Hz=Hz)
     label_y(axes[0, 0], f"dynamic stiffness\nat {plain('+'.join(names))}{unit}")
     label_y(axes[1, 0], "loss angle [deg]")
@@ -173,11 +174,12 @@ def transmissibility_plot(
     if omega is None:
         omega = motion_frequencies(models, from_ if kind == "motion" else to, linear=xscale == "linear")
     responses = [transmissibility_response(model, from_, to, omega, kind=kind) for model in models]
-    axes, causes, results = _prepared(ax, "modulus and phase"), as_tuple(from_), as_tuple(to)
+    causes, results = as_tuple(from_), as_tuple(to)
     unit = _ratio_unit(models[0], units, results, causes)
     if kind == "force":
         unit = _ratio_unit(models[0], units, force_names(results), force_names(causes))
         causes, results = force_names(causes), reaction_names(results)
+    axes = _prepared(ax, "modulus and phase")
     lines = _draw(axes, responses, texts, Hz=Hz)
     label_y(axes[0, 0], f"transmissibility\n|{plain('+'.join(results))}/{plain('+'.join(causes))}|{unit}")
     label_y(axes[1, 0], "phase [deg]")
@@ -191,7 +193,8 @@ def transmissibility_plot(
 
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
     """Give the models as a list, and the text of each in the legend; an underscore keeps it out."""
-    models = [sysdata] if isinstance(sysdata, SecondOrderModel) else list(sysdata) if np.iterable(sysdata) else []
+    given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
+    models = list(given) if isinstance(given, Iterable) else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
         msg = f"sysdata must be a SecondOrderModel or a list of some, not {type(sysdata).__name__}."
         raise ParameterError(msg, parameter="sysdata", value=sysdata)

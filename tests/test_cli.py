@@ -11,7 +11,7 @@ import control
 import numpy as np
 import pytest
 
-from halfdof_ctrl import frequency_response, hydromount, mech2ss, mechss
+from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.crosscheck import CrossCheck
 from halfdof_ctrl.design import lqr
@@ -82,6 +82,39 @@ def test_a_single_limit_keeps_the_other_one() -> None:
     assert main(["bode", "hydromount", "--omega-max", "5", "-o", "a.csv"]) == 0
     omega = [float(row[0]) for row in table("a.csv")[1:]]
     assert [omega[0], omega[-1]] == pytest.approx([0.3174, 5.0], rel=1e-3)
+
+
+def test_stiffness_numbers_are_those_of_dynamic_stiffness() -> None:
+    """Of the mount alone, from rest on evenly spread frequencies; with --log as bode spreads them."""
+    mount = ["stiffness", "hydromount", "-p", "m=0", "--omega-max", "100", "--points", "3", "-o", "a.csv"]
+    assert main(mount) == 0
+    rows = table("a.csv")
+    assert rows[0][2:] == ["R_y/y real", "R_y/y imag", "R_y/y magnitude", "R_y/y phase [deg]"]
+    assert [float(row[0]) for row in rows[1:]] == [0.0, 50.0, 100.0]
+    exact = dynamic_stiffness(hydromount(m=0), "y", [0.0, 50j, 100j])
+    np.testing.assert_array_equal([complex(float(row[2]), float(row[3])) for row in rows[1:]], exact)
+    assert main([*mount, "--log", "--omega-min", "1", "--dof", "y,y1"]) == 0
+    rows = table("a.csv")
+    assert [float(row[0]) for row in rows[1:]] == pytest.approx([1.0, 10.0, 100.0], rel=1e-14)
+    assert rows[0][2] == "R_y+R_y1/y+y1 real"
+
+
+@pytest.mark.parametrize("arguments", [[], ["--log", "--omega-max", "100"], ["--dof", "y1"]])
+def test_stiffness_is_drawn(arguments: list[str]) -> None:
+    """The loaded mount at y unless another DOF is asked for."""
+    assert main(["stiffness", "hydromount", *arguments, "-o", "a.svg"]) == 0
+    assert b"<svg" in Path("a.svg").read_bytes()
+
+
+def test_stiffness_of_a_file_needs_a_dof_where_there_are_several(capsys: pytest.CaptureFixture[str]) -> None:
+    """The only one is meant by itself."""
+    save_model(mechss([[1.0]], None, [[1.0]]), "one.npz")
+    save_model(hydromount(), "three.npz")
+    assert main(["stiffness", "one.npz", "-o", "a.csv"]) == 0
+    assert main(["stiffness", "three.npz", "-o", "b.csv"]) == 2
+    assert "--dof must name the DOF whose dynamic stiffness is meant: y, y1, y2." in capsys.readouterr().err
+    assert not Path("b.csv").exists()
+    assert main(["stiffness", "three.npz", "--dof", "y", "-o", "b.csv"]) == 0
 
 
 def test_step_numbers_include_the_recovered_half_dofs() -> None:
@@ -191,13 +224,18 @@ REFUSALS = [
     ("bode hydromount -p C_h -o a.png", "-p takes a name and a number, NAME=VALUE, not 'C_h'."),
     ("bode hydromount -p m=1 -p m=2 -o a.png", "-p gives m twice."),
     ("bode hydromount -p c=1 -o a.png", "hydromount has no parameter 'c'. Known: m, K_r"),
-    ("bode hydromount -p m=0 -o a.png", "the mass on the mount must be positive"),
-    ("bode hydromount -p m=nan -o a.png", "the mass on the mount must be positive"),
+    ("bode hydromount -p m=-1 -o a.png", "the mass on the mount must be a number that is not negative"),
+    ("bode hydromount -p m=nan -o a.png", "the mass on the mount must be a number that is not negative"),
     ("bode hydromount --inputs F_q -o a.png", "The model has no input 'F_q'. Known: F_y, F_y1, F_y2."),
     ("bode hydromount --outputs , -o a.png", "No output is selected"),
     ("bode hydromount --omega-min 5 --omega-max 1 -o a.csv", "must be positive and rise"),
     ("bode hydromount --omega-min nan -o a.csv", "must be positive and rise"),
     ("bode hydromount --points 1 -o a.csv", "--points 1, but a range of frequencies has 2 to 1000000 of them."),
+    ("stiffness hydromount --dof q -o a.png", "The model has no DOF 'q'. Known: y, y1, y2."),
+    ("stiffness hydromount --dof , -o a.csv", "No DOF is named"),
+    ("stiffness hydromount --omega-min -1 -o a.csv", "must be positive and rise"),
+    ("stiffness hydromount --log --omega-min 0 -o a.csv", "must be positive and rise"),
+    ("stiffness hydromount -o a.npz", "Use .png, .svg, .pdf, .csv."),
     ("bode hydromount -o no/a.png", "no/a.png: No such file or directory"),
     ("bode hydromount -o bad.npz/a.png", "bad.npz/a.png: Not a directory"),
     ("step hydromount --time -1 -o a.png", "must be a positive number of seconds, not -1.0"),
@@ -225,7 +263,17 @@ def test_what_is_refused_gets_one_line_and_exit_code_two(
 
 
 @pytest.mark.parametrize(
-    "line", ["", "nonsense hydromount", "bode", "bode hydromount", "bode hydromount --points x -o a.png", "ss a --abc"]
+    "line",
+    [
+        "",
+        "nonsense hydromount",
+        "bode",
+        "bode hydromount",
+        "bode hydromount --points x -o a.png",
+        "ss a --abc",
+        "stiffness hydromount",
+        "stiffness hydromount --outputs y -o a.png",
+    ],
 )
 def test_what_the_parser_does_not_know_is_exit_code_two(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     """With the usage, by argparse."""

@@ -21,6 +21,8 @@ from halfdof_ctrl.design import lqr
 from halfdof_ctrl.errors import FileFormatError, MatrixError, SignalNameError
 from halfdof_ctrl.files import load_model, load_system, replacing, save_gain, save_model, save_response, save_system
 from halfdof_ctrl.model import LETTERS
+from halfdof_ctrl.motion import KINDS, MotionKind
+from halfdof_ctrl.names import motion_names
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".mat"])
 MOUNT = hydromount()
@@ -35,7 +37,8 @@ def same(one: SecondOrderModel, other: SecondOrderModel) -> bool:
         and getattr(one, letter).tobytes() == getattr(other, letter).tobytes()
         for letter in LETTERS
     )
-    return matrices and all(getattr(one, key) == getattr(other, key) for key in ("dofs", "inputs", "outputs", "name"))
+    keys = ("dofs", "inputs", "outputs", "name", "prescribed")
+    return matrices and all(getattr(one, key) == getattr(other, key) for key in keys)
 
 
 def random_model(seed: int) -> SecondOrderModel:
@@ -89,6 +92,26 @@ def test_the_model_without_its_name_or_with_its_defaults_comes_back(
     """Single DOFs, selected signals and a missing name are kept as they are."""
     save_model(model, str(tmp_path / f"model{ending}"))
     assert same(load_model(str(tmp_path / f"model{ending}")), model)
+
+
+@ENDINGS
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_prescribed_motion_comes_back(tmp_path: Path, ending: str, kind: MotionKind) -> None:
+    """With names of the force on the DOF and of its motion where these are direct terms, and without."""
+    full = {"inputs": ["F_y", motion_names(("y",), KINDS.index(kind))[0]], "outputs": ["y_dot", "y_ddot", "y2", "R_y"]}
+    options: list[dict[str, Any]] = [{}, full]
+    for signals in options:
+        model = MOUNT.prescribe_motion("y", kind, **signals)
+        save_model(model, tmp_path / f"model{ending}")
+        assert same(load_model(tmp_path / f"model{ending}"), model)
+    with pytest.raises(SignalNameError, match="The motion of y is prescribed already"):
+        load_model(tmp_path / f"model{ending}").prescribe_motion("y")
+
+
+def test_a_prescribed_model_without_signal_names_gets_the_usual_ones(tmp_path: Path) -> None:
+    """As in mechss."""
+    path = written_npz(tmp_path / "model.npz", K=K, dofs=np.array(["a", "b"]), prescribed=np.array(["b"]))
+    assert (load_model(path).inputs, load_model(path).prescribed) == (("F_a", "F_b"), ("b",))
 
 
 @pytest.mark.parametrize("missing", [(), ("M",), ("C",), ("M", "C")])

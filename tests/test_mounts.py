@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from halfdof_ctrl import frequency_response, hydromount, mech2ss
+from halfdof_ctrl import exact_reduction, frequency_response, hydromount, mech2ss
 from halfdof_ctrl.errors import ParameterError
 
 ROUNDOFF = 1e-10  # springs over six decades in series and parallel; python-control's own dcgain loses to 1e-8 here
@@ -39,10 +39,20 @@ def test_removed_damper_makes_a_static_dof() -> None:
     assert mech2ss(hydromount(C_h=0.0)).state_labels == ["y", "y1", "y_dot"]
 
 
-@pytest.mark.parametrize("m", [0.0, -1.0, math.nan, math.inf])
-def test_mass_must_be_positive(m: float) -> None:
+def test_mount_alone_is_a_model_of_two_states() -> None:
+    """Without the mass y and y1 are damped against each other only: one static combination, and no mass at all."""
+    model = hydromount(m=0)
+    assert not model.M.any()
+    assert exact_reduction(model).order == 2
+    assert_allclose(model.select("F_y", "y")(0), 1 / 5250, rtol=ROUNDOFF)
+
+
+@pytest.mark.parametrize("m", [-1.0, math.nan, math.inf])
+def test_mass_must_not_be_negative(m: float) -> None:
     """The refusal names the parameter and its value."""
-    with pytest.raises(ParameterError, match=r"m = .* kg, but the mass on the mount must be positive") as refusal:
+    with pytest.raises(
+        ParameterError, match=r"m = .* kg, but the mass on the mount must be a number that is not neg"
+    ) as refusal:
         hydromount(m=m)
     assert refusal.value.parameter == "m"
 

@@ -515,6 +515,15 @@ def test_plots_draw_on_given_axes(plot: Plot, shape: tuple[int, int]) -> None:
     figure.canvas.draw()
 
 
+@pytest.mark.parametrize("plot", [bode_plot, step_plot])
+def test_grid_lines_can_be_left_out(plot: Plot) -> None:
+    """Without a word from matplotlib, and taken away where they were."""
+    axes = plot(mount()).axes
+    assert all(line.get_visible() for ax in axes.flat for line in ax.get_xgridlines())
+    plot(mount(), ax=axes, grid=False)
+    assert not any(line.get_visible() for ax in axes.flat for line in ax.get_xgridlines())
+
+
 @PLOTS
 def test_axes_of_the_wrong_shape_are_refused(plot: Plot, shape: tuple[int, int]) -> None:
     """The message says which shape is needed, and nothing is drawn before."""
