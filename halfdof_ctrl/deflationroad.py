@@ -64,9 +64,14 @@ class StateSelection:
         """DOFs without a state: they follow from the others and the inputs."""
         return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
 
-    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
         """Tell for each of the model's DOFs with less than two states whether it is half or static."""
         return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
+
+    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Give the states that belong to displacements and velocities of all n DOFs; higher derivatives are zero."""
+        from_q, from_v = self.state_maps()[:2]
+        return np.asarray(from_q @ displacements + from_v @ velocities)
 
     def state_maps(self) -> tuple[FloatArray, ...]:
         """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""

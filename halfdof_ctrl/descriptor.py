@@ -16,6 +16,7 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, Matrix
 from halfdof_ctrl.balancing import equilibrating_powers
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.errors import CloseDecisionWarning, callers_level
 from halfdof_ctrl.growth import improper_pairs, system_pencil
 from halfdof_ctrl.model import SecondOrderModel
@@ -24,6 +25,7 @@ from halfdof_ctrl.patterns import diagonal_blocks
 from halfdof_ctrl.pencils import CLEAR_MARGIN, GENERIC_POINTS, finite_part, infinite_part
 from halfdof_ctrl.quadratics import first_order_pencil, time_scale
 from halfdof_ctrl.refusals import singular_pencil_error
+from halfdof_ctrl.sparseregular import require_regular_sparse
 from halfdof_ctrl.staircase import RANK_TOLERANCE
 
 
@@ -98,6 +100,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     >>> structure.improper_pairs
     (('F_q2', 'q2', 2),)
     """
+    model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
     pencil = first_order_pencil((model.K, model.C, model.M))
     finite, infinite = finite_part(pencil.A, pencil.E), infinite_part(pencil.A, pencil.E)
     eigenvalues = _sorted(finite.eigenvalues * pencil.scale)
@@ -162,6 +165,7 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     >>> zeros(mechss(np.eye(2), None, [[5, -4], [-4, 4]], [1, 0], [1, 0])).imag.round(9).tolist()
     [2.0, -2.0]
     """
+    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
     require_regular(model)
     every = _independent(model)
     pencil = first_order_pencil(system_pencil(model, *every))
@@ -200,6 +204,9 @@ def require_regular(model: SecondOrderModel) -> None:
     SingularPencilError
         ``P(s)`` is singular to working precision at three generic points.
     """
+    if model.is_sparse:
+        require_regular_sparse(model)
+        return
     gamma = typical_frequency(model)
     P = model.K
     for point in GENERIC_POINTS:

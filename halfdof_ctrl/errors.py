@@ -140,6 +140,15 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class ModelSizeError(HalfdofError):
+    """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
+
+    def __init__(self, message: str, *, size: int, limit: int) -> None:
+        super().__init__(message)
+        self.size = size
+        self.limit = limit
+
+
 class FileFormatError(HalfdofError):
     """A file cannot be read as a model, or its ending names no known format.
 

@@ -11,6 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.sparsearrays import is_sparse
+from halfdof_ctrl.sparseevaluation import sparse_transfer
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
@@ -25,7 +27,7 @@ def quadratic_transfer(
 
     Parameters
     ----------
-    P, B, F, D : sequences of (n, n), (n, m), (p, n), (p, m) ndarrays
+    P, B, F, D : sequences of (n, n), (n, m), (p, n), (p, m) ndarrays, or all csc_arrays
         Coefficients of 1, s, s^2.
     points : (k,) complex ndarray
         Where to evaluate [rad/s].
@@ -35,6 +37,8 @@ def quadratic_transfer(
     (p, m, k) complex ndarray
         ``inf + nan j`` in every entry where ``P(s)`` is exactly singular.
     """
+    if is_sparse(P[0]):
+        return sparse_transfer(P, B, F, D, points)
     values = np.empty((*D[0].shape, points.size), dtype=np.complex128)
     batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
     for start in range(0, points.size, batch):
