@@ -26,6 +26,7 @@ from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, levelled
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
+PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
 CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
 
 
@@ -156,7 +157,7 @@ class _Chain:
             columns = determined[-1][offsets.unknowns[determined[-1]] >= level]
             columns = columns[::-1]
             part = levelled(system, offsets, J, rows, columns).matrix
-            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size)
+            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, PIVOT_SHARE)
             determined.append(np.sort(columns[picked]))
         return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
 
