@@ -250,21 +250,27 @@ class _Block:
         ]
 
 
-def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> "_Levelled":
-    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
-    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
-    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
-    part = J[np.ix_(rows, columns)]
-    more_r, more_c = levelling_factors(part * r[:, None] * c)
-    r, c = r * more_r, c * more_c
-    return _Levelled(part * r[:, None] * c, r, c)
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class _Levelled:
+class ScaledPart:
+    """A part of J in other units."""
+
     matrix: FloatArray
     rows: FloatArray  #: factors of the rows
     columns: FloatArray
+
+
+def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units."""
+    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
+    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
+    return ScaledPart(J[np.ix_(rows, columns)] * r[:, None] * c, r, c)
+
+
+def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
+    part = unit_free(system, offsets, J, rows, columns)
+    r, c = levelling_factors(part.matrix)
+    return ScaledPart(part.matrix * r[:, None] * c, part.rows * r, part.columns * c)
 
 
 def independent_rows(matrix: FloatArray, given: FloatArray, count: int, share: float) -> IndexArray:
