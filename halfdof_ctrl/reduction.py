@@ -34,7 +34,7 @@ from halfdof_ctrl.errors import (
     SingularLeadingMatrixError,
     callers_level,
 )
-from halfdof_ctrl.leading import PLAINLY_REGULAR, SINGULAR, LeadingMatrix
+from halfdof_ctrl.leading import SINGULAR, LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.outputs import output_signal, without_rounding
@@ -56,6 +56,7 @@ ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
+LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves
 LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
 
@@ -413,7 +414,7 @@ def _warned(reduction: ExactReduction) -> ExactReduction:
             "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    if reduction.rcond < PLAINLY_REGULAR and reduction.tol is None:
+    if reduction.rcond < LOSS_SUSPECTED and reduction.tol is None:
         _warn_of_lost_digits(loss(reduction.model, reduction.equations), reduction.rcond)
     return reduction
 

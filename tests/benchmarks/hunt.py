@@ -1,0 +1,210 @@
+"""Hunt for failures over thousands of random structures of any index, judged by exact arithmetic.
+
+Run ``python tests/benchmarks/hunt.py --cases 10000 --seed 1 --kind mixed`` from the project's folder. Each failure is
+printed with the seed that draws it again (``--again mixed 5 2001247``); at the end come counts and worst errors per
+kind, and the smallest failing models as code. ``--largest 5`` hunts among small ones.
+"""
+
+import argparse
+import sys
+import time
+import warnings
+from collections import defaultdict
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import rational
+from anykinds import ANY_KIND, Kind, in_units, signals
+from structures import Structure
+from verdict import (
+    Improved,
+    characteristic_error,
+    eigenvalue_error,
+    polynomial_at,
+    polynomial_error,
+    roll_off_error,
+    transfer_errors,
+)
+
+import halfdof_ctrl as hd
+from halfdof_ctrl.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.model import LETTERS
+
+POINTS = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
+LIMITS = {
+    "transfer": 1e-8,
+    "proper": 1e-8,
+    "far": 1e-10,
+    "polynomial": 1e-8,
+    "characteristic": 1e-7,
+    "eigenvalue": 1e-7,
+}
+
+
+@dataclass
+class Finding:
+    """What one model showed."""
+
+    complaints: list[str] = field(default_factory=list)
+    errors: dict[str, float] = field(default_factory=dict)
+    method: str = "-"
+    index: int = -1
+    rcond: float = float("nan")
+    said: list[str] = field(default_factory=list)
+
+
+def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
+    """Reduce a model whose unit of time is tau [s] and compare all that is promised with exact arithmetic."""
+    finding = Finding()
+    exact = rational.rational_transfer(model)
+    try:
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            reduction = hd.exact_reduction(model)
+    except SingularPencilError as refusal:
+        _judge_refusal(finding, structure, refusal, exact)
+        return finding
+    except Exception as other:  # noqa: BLE001  # whatever it is, it is a finding
+        finding.complaints.append(f"{type(other).__name__} for a pencil of order {exact.order}: {str(other)[:90]}")
+        return finding
+    finding.said = sorted({warning.category.__name__ for warning in said})
+    finding.method, finding.rcond = reduction.method, reduction.rcond
+    if reduction.order != exact.order:
+        finding.complaints.append(f"order {reduction.order}, exactly {exact.order}")
+        return finding
+    finding.index = rational.pencil_index(*structure.matrices)
+    if (reduction.index, reduction.n_infinite) != (finding.index, 2 * structure.size - exact.order):
+        finding.complaints.append(f"index {reduction.index}, n_infinite {reduction.n_infinite}")
+    _judge_channels(finding, model, reduction, exact, tau)
+    finding.complaints += [
+        f"{what} error {error:.1e}" for what, error in finding.errors.items() if not error <= LIMITS[what]
+    ]
+    return finding
+
+
+def _judge_refusal(
+    finding: Finding, structure: Structure, refusal: SingularPencilError, exact: rational.RationalTransfer
+) -> None:
+    if exact.order >= 0:
+        finding.complaints.append("false refusal: SingularPencilError for a regular pencil")
+        return
+    free = rational.free_dofs(*structure.matrices)
+    named = np.array([dof in refusal.dofs for dof in structure.model().dofs])
+    if not named.any() or (named & ~free).any():
+        finding.complaints.append(f"refusal names {refusal.dofs}, free are {np.flatnonzero(free).tolist()}")
+
+
+def _judge_channels(
+    finding: Finding,
+    model: hd.SecondOrderModel,
+    reduction: hd.ExactReduction,
+    exact: rational.RationalTransfer,
+    tau: float,
+) -> None:
+    growth = exact.growth
+    improper = tuple(
+        (model.inputs[j], model.outputs[i], int(growth[i, j])) for i, j in np.argwhere(growth > 0).tolist()
+    )
+    try:
+        hd.mech2ss(reduction)
+        refused: tuple[tuple[str, str, int], ...] = ()
+    except ImproperError as refusal:
+        refused = refusal.pairs
+    if set(refused) != set(improper):
+        finding.complaints.append(f"improper pairs {refused}, exactly {improper}")
+    polynomial, points, roll_off = exact.polynomial_part(), POINTS / tau, FAR / tau
+    system = Improved.of(hd.mech2ss(reduction, improper="drop"), reduction.polynomial_part)
+    if tau != 1.0:  # a plain solve does not know that states have units
+        system = system.balanced()
+    finding.errors["polynomial"] = polynomial_error(reduction.polynomial_part, polynomial)
+    near, exactly = system.at(points), exact.at(points)
+    also = polynomial_at(polynomial, points, system.D.shape)
+    finding.errors["transfer"] = float(transfer_errors(near, exactly, also).max())
+    proper = growth <= 0
+    finding.errors["proper"] = float(transfer_errors(near[proper][None], exactly[proper][None]).max())
+    finding.errors["far"] = roll_off_error(system.at(roll_off)[proper], exact.at(roll_off)[proper])
+    finding.errors["characteristic"] = characteristic_error(system.A, exact, points)
+    finding.errors["eigenvalue"] = eigenvalue_error(system.A, exact, floor=1.0 / tau)
+
+
+def drawn(kind: Kind, size: int, seed: int) -> tuple[Structure, hd.SecondOrderModel]:
+    """Draw a model again from its kind, size and seed."""
+    generator = np.random.default_rng([seed, size])
+    structure = kind(generator, size)
+    return structure, signals(generator, structure)
+
+
+def rescaled(model: hd.SecondOrderModel, seed: int) -> tuple[hd.SecondOrderModel, float]:
+    """Give a model in random units of its DOFs, equations and time, powers of eight that round nothing."""
+    generator = np.random.default_rng([seed, 8])
+    columns, rows = 8.0 ** generator.integers(-9, 10, (2, len(model.dofs)))
+    tau = 8.0 ** int(generator.integers(-9, 10))
+    return in_units(model, columns, rows, tau), tau
+
+
+def shown(structure: Structure, model: hd.SecondOrderModel) -> str:
+    """Write a model with integer entries as code."""
+    letters = [letter for letter in LETTERS if letter in "MCK" or getattr(model, letter).any()]
+    code = ", ".join(f"{letter}={getattr(model, letter).astype(int).tolist()}" for letter in letters)
+    return f"{structure.kind}: hd.mechss({code})"
+
+
+def main() -> None:
+    """Hunt and report."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=1600)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--largest", type=int, default=12)
+    parser.add_argument("--kind", action="append", help="names of kinds, all by default")
+    parser.add_argument("--units", action="store_true", help="in random units")
+    parser.add_argument("--again", nargs=3, metavar=("KIND", "SIZE", "SEED"), help="judge one model again and show it")
+    parser.add_argument("--shown", type=int, default=25, help="failures to be printed in full")
+    options = parser.parse_args()
+    if options.again:
+        name, size, seed = options.again
+        structure, model = drawn(next(kind for kind in ANY_KIND if kind.__name__ == name), int(size), int(seed))
+        scaled, tau = rescaled(model, int(seed)) if options.units else (model, 1.0)
+        print(shown(structure, model), judged(structure, scaled, tau), sep="\n")
+        return
+    kinds = [kind for kind in ANY_KIND if options.kind is None or kind.__name__ in options.kind]
+    counts: dict[str, dict[str, int]] = defaultdict(lambda: defaultdict(int))
+    worst: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
+    failures: list[tuple[int, str]] = []
+    start = time.time()
+    for case in range(options.cases):
+        kind = kinds[case % len(kinds)]
+        seed = options.seed * 1_000_000 + case
+        size = int(np.random.default_rng(seed).integers(1, options.largest + 1))
+        structure, model = drawn(kind, size, seed)
+        scaled, tau = rescaled(model, seed) if options.units else (model, 1.0)
+        finding = judged(structure, scaled, tau)
+        row = kind.__name__
+        counts[row]["cases"] += 1
+        counts[row][finding.method] += 1
+        for warning in finding.said:
+            counts[row][warning] += 1
+        for what, error in finding.errors.items():
+            worst[row][what] = max(worst[row][what], error)
+        if finding.complaints:
+            counts[row]["failed"] += 1
+            text = (
+                f"kind {row}, size {size}, seed {seed}, {finding.method}, index {finding.index}, "
+                f"rcond {finding.rcond:.0e}, {finding.said}: " + "; ".join(finding.complaints)
+            )
+            failures.append((size, f"{text}\n    {shown(structure, model)}"))
+            print(text, flush=True)
+    print(f"\n{options.cases} cases in {time.time() - start:.0f} s")
+    for row, count in counts.items():
+        print(f"{row:16}", dict(count), {what: f"{error:.0e}" for what, error in worst[row].items()})
+    print(f"{len(failures)} failures; the smallest:")
+    for _, text in sorted(failures, key=lambda failure: failure[0])[: options.shown]:
+        print(text)
+
+
+if __name__ == "__main__":
+    main()
