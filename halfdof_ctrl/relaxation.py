@@ -132,27 +132,32 @@ def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Re
         Singular values of a scaled block at most `tol` times its largest count as zero; by default 16 eps times the
         block's size, or what its rounding errors amount to.
     """
-    blocks: dict[bytes, _Block] = {}  # those without a dependent row come again
+    blocks: dict[bytes, _Block] = {}  # one whose rows stay as they are comes again
     while True:
         offsets = structural_offsets(system.matrix != 0.0)
-        dependent: list[_Elimination] = []
-        if offsets is not None:
-            J = offsets.tight(system.matrix)
-            for rows in irreducible_blocks(J != 0.0, offsets.matching):
-                if rows.size > 1:
-                    columns = np.sort(offsets.matching[rows])
-                    key = b"".join(
-                        part.tobytes()
-                        for part in (rows, J[np.ix_(rows, columns)], offsets.equations[rows], offsets.unknowns[columns])
-                    )
-                    if key not in blocks:
-                        blocks[key] = _Block.of(system, offsets, J, rows, columns, caution, tol)
-                    if blocks[key].decision.rank < rows.size:
-                        dependent.extend(blocks[key].eliminations())
-        if not dependent:
+        found = [] if offsets is None else _blocks(system, offsets, caution, tol, blocks)
+        dependent = [item for block in found if block.decision.rank < block.rows.size for item in block.eliminations()]
+        if offsets is None or not dependent:
             decisions = tuple([block.decision for block in blocks.values()])
             return Relaxed(system=system, offsets=offsets, decisions=decisions)
         system = _with_rows_replaced(system, offsets, dependent, caution)
+
+
+def _blocks(
+    system: RowSystem, offsets: Offsets, caution: Caution, tol: float | None, known: "dict[bytes, _Block]"
+) -> "list[_Block]":
+    """Give the irreducible blocks of J with more than one row, and add those that are new to the known ones."""
+    J = offsets.tight(system.matrix)
+    found = []
+    for rows in irreducible_blocks(J != 0.0, offsets.matching):
+        if rows.size > 1:
+            columns = np.sort(offsets.matching[rows])
+            parts = rows, J[np.ix_(rows, columns)], offsets.equations[rows], offsets.unknowns[columns]
+            key = b"".join([part.tobytes() for part in parts])
+            if key not in known:
+                known[key] = _Block.of(system, offsets, J, rows, columns, caution, tol)
+            found.append(known[key])
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -229,13 +234,14 @@ class _Block:
     def _expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[_Elimination]":
         if dependent.size == 0:
             return []
-        x = error = np.zeros((sources.size, dependent.size))
+        x: FloatArray = np.zeros((sources.size, dependent.size))
+        error = x
         if sources.size:
             Q, R = scipy.linalg.qr(self.matrix[sources].T, mode="economic")
             x = scipy.linalg.solve_triangular(R, Q.T @ self.matrix[dependent].T)
-            sensitivity = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(sources.size)), axis=1)
+            sensitivity = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(sources.size)), axis=1, keepdims=True)
             noise = self.variance[dependent].sum(axis=1) + self.variance[sources].sum(axis=1) @ x**2
-            error = np.maximum(EPS * np.abs(x), sensitivity[:, None] * np.sqrt(noise))
+            error = np.maximum(EPS * np.abs(x), sensitivity * np.sqrt(noise))
         ratio = self.row_factors[sources][:, None] / self.row_factors[dependent]
         multipliers, errors = _shortest_dyadic(x * ratio, SNAP * error * ratio), error * ratio
         return [
