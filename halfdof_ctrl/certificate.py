@@ -19,7 +19,7 @@ from halfdof_ctrl.spectrum import balanced_states
 
 NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
 BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
-DRIFT = 0.1  #: change of the logarithm of the ratio in (19) that rounding may make
+DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
 SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
 AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
 DOUBT = 4 * float(np.finfo(float).eps)  #: times n and the condition of P(s): differences that a direct solve may make

@@ -23,9 +23,10 @@ import numpy as np
 from halfdof_ctrl.arrays import FloatArray, read_only
 from halfdof_ctrl.leading import LeadingMatrix
 from halfdof_ctrl.offsets import IndexArray, Offsets
-from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, levelled
+from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, unit_free
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
+PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
 CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
 
 
@@ -148,15 +149,19 @@ class _Chain:
 
     @classmethod
     def of(cls, system: RowSystem, offsets: Offsets) -> "_Chain":
-        """Choose S_l inside S_{l-1}, well conditioned and with the last DOFs first, so that the first stay states."""
+        """Choose S_l inside S_{l-1}, well conditioned and with the last DOFs first, so that the first stay states.
+
+        A DOF that equations hardly contain, measured in unit-free scaling, must not follow from them.
+        """
         J = offsets.tight(system.matrix)
         determined = [np.arange(system.size)]
         for level in range(1, _levels(offsets)):
             rows = np.flatnonzero(offsets.equations >= level)
             columns = determined[-1][offsets.unknowns[determined[-1]] >= level]
             columns = columns[::-1]
-            part = levelled(system, offsets, J, rows, columns).matrix
-            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size)
+            part = unit_free(system, offsets, J, rows, columns).matrix
+            part = part / np.abs(part).max(axis=1, keepdims=True, initial=0.0)
+            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, PIVOT_SHARE)
             determined.append(np.sort(columns[picked]))
         return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
 

@@ -28,7 +28,7 @@ from halfdof_ctrl.scaling import gap_threshold, levelling_factors, logarithmic_s
 
 EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
-PIVOT_SHARE = 0.3  #: of the largest pivot, from which on an earlier row or column is taken
+PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
 DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
 UNCLEAR = 100.0  #: singular values above the bound and below this times it may be either
 SNAP = 4.0  #: root mean square errors within which a shorter multiplier is as good
@@ -132,22 +132,32 @@ def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Re
         Singular values of a scaled block at most `tol` times its largest count as zero; by default 16 eps times the
         block's size, or what its rounding errors amount to.
     """
-    decisions: dict[bytes, BlockDecision] = {}
+    blocks: dict[bytes, _Block] = {}  # one whose rows stay as they are comes again
     while True:
         offsets = structural_offsets(system.matrix != 0.0)
-        if offsets is None:
-            return Relaxed(system=system, offsets=None, decisions=tuple(decisions.values()))
-        J = offsets.tight(system.matrix)
-        dependent: list[_Elimination] = []
-        for rows in irreducible_blocks(J != 0.0, offsets.matching):
-            if rows.size > 1:
-                block = _Block.of(system, offsets, J, rows, caution, tol)
-                decisions.setdefault(block.key, block.decision)
-                if block.decision.rank < rows.size:
-                    dependent.extend(block.eliminations())
-        if not dependent:
-            return Relaxed(system=system, offsets=offsets, decisions=tuple(decisions.values()))
+        found = [] if offsets is None else _blocks(system, offsets, caution, tol, blocks)
+        dependent = [item for block in found if block.decision.rank < block.rows.size for item in block.eliminations()]
+        if offsets is None or not dependent:
+            decisions = tuple([block.decision for block in blocks.values()])
+            return Relaxed(system=system, offsets=offsets, decisions=decisions)
         system = _with_rows_replaced(system, offsets, dependent, caution)
+
+
+def _blocks(
+    system: RowSystem, offsets: Offsets, caution: Caution, tol: float | None, known: "dict[bytes, _Block]"
+) -> "list[_Block]":
+    """Give the irreducible blocks of J with more than one row, and add those that are new to the known ones."""
+    J = offsets.tight(system.matrix)
+    found = []
+    for rows in irreducible_blocks(J != 0.0, offsets.matching):
+        if rows.size > 1:
+            columns = np.sort(offsets.matching[rows])
+            parts = rows, J[np.ix_(rows, columns)], offsets.equations[rows], offsets.unknowns[columns]
+            key = b"".join([part.tobytes() for part in parts])
+            if key not in known:
+                known[key] = _Block.of(system, offsets, J, rows, columns, caution, tol)
+            found.append(known[key])
+    return found
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -172,13 +182,18 @@ class _Block:
     variance: FloatArray  #: mean squares of its errors
     row_factors: FloatArray
     decision: BlockDecision
-    key: bytes
 
     @classmethod
     def of(
-        cls, system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, caution: Caution, tol: float | None
+        cls,
+        system: RowSystem,
+        offsets: Offsets,
+        J: FloatArray,
+        rows: IndexArray,
+        columns: IndexArray,
+        caution: Caution,
+        tol: float | None,
     ) -> "_Block":
-        columns = np.sort(offsets.matching[rows])
         place = np.ix_(rows, columns)
         scaled = levelled(system, offsets, J, rows, columns)
         factors = scaled.rows[:, None] * scaled.columns
@@ -201,59 +216,70 @@ class _Block:
             variance=variance,
             row_factors=scaled.rows,
             decision=decision,
-            key=rows.tobytes() + J[place].tobytes(),
         )
 
     def eliminations(self) -> list[_Elimination]:
         """Express the dependent rows by independent ones that are differentiated at least as often."""
         taken: list[int] = []
-        dependent: list[tuple[int, int]] = []
+        found: list[_Elimination] = []
         for times in np.unique(self.times)[::-1].tolist():
             group = np.flatnonzero(self.times == times)
             values = scipy.linalg.svdvals(self.matrix[self.times >= times])
             rank = int(np.count_nonzero(values > self.decision.bound))
-            picked = independent_rows(self.matrix[group], self.matrix[taken], rank - len(taken))
+            picked = independent_rows(self.matrix[group], self.matrix[taken], rank - len(taken), PIVOT_SHARE)
             taken.extend(group[picked].tolist())
-            dependent.extend((row, len(taken)) for row in np.setdiff1d(group, group[picked]).tolist())
-        return [self._expressed(row, np.array(taken[:count], dtype=np.intp)) for row, count in dependent]
+            found.extend(self._expressed(np.setdiff1d(group, group[picked]), np.array(taken, dtype=np.intp)))
+        return found
 
-    def _expressed(self, row: int, sources: IndexArray) -> _Elimination:
-        if sources.size == 0:
-            x = error = np.zeros(0)
-        else:
+    def _expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[_Elimination]":
+        if dependent.size == 0:
+            return []
+        x: FloatArray = np.zeros((sources.size, dependent.size))
+        error = x
+        if sources.size:
             Q, R = scipy.linalg.qr(self.matrix[sources].T, mode="economic")
-            x = scipy.linalg.solve_triangular(R, Q.T @ self.matrix[row])
-            sensitivity = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(sources.size)), axis=1)
-            noise = self.variance[row].sum() + x**2 @ self.variance[sources].sum(axis=1)
+            x = scipy.linalg.solve_triangular(R, Q.T @ self.matrix[dependent].T)
+            sensitivity = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(sources.size)), axis=1, keepdims=True)
+            noise = self.variance[dependent].sum(axis=1) + self.variance[sources].sum(axis=1) @ x**2
             error = np.maximum(EPS * np.abs(x), sensitivity * np.sqrt(noise))
-        ratio = self.row_factors[sources] / self.row_factors[row]
-        return _Elimination(
-            row=int(self.rows[row]),
-            columns=self.columns,
-            sources=self.rows[sources],
-            multipliers=_shortest_dyadic(x * ratio, SNAP * error * ratio),
-            errors=error * ratio,
-        )
-
-
-def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> "_Levelled":
-    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
-    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
-    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
-    part = J[np.ix_(rows, columns)]
-    more_r, more_c = levelling_factors(part * r[:, None] * c)
-    r, c = r * more_r, c * more_c
-    return _Levelled(part * r[:, None] * c, r, c)
+        ratio = self.row_factors[sources][:, None] / self.row_factors[dependent]
+        multipliers, errors = _shortest_dyadic(x * ratio, SNAP * error * ratio), error * ratio
+        return [
+            _Elimination(
+                row=row,
+                columns=self.columns,
+                sources=self.rows[sources],
+                multipliers=multipliers[:, k],
+                errors=errors[:, k],
+            )
+            for k, row in enumerate(self.rows[dependent].tolist())
+        ]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Levelled:
+class ScaledPart:
+    """A part of J in other units."""
+
     matrix: FloatArray
     rows: FloatArray  #: factors of the rows
     columns: FloatArray
 
 
-def independent_rows(matrix: FloatArray, given: FloatArray, count: int) -> IndexArray:
+def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units."""
+    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
+    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
+    return ScaledPart(J[np.ix_(rows, columns)] * r[:, None] * c, r, c)
+
+
+def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
+    part = unit_free(system, offsets, J, rows, columns)
+    r, c = levelling_factors(part.matrix)
+    return ScaledPart(part.matrix * r[:, None] * c, part.rows * r, part.columns * c)
+
+
+def independent_rows(matrix: FloatArray, given: FloatArray, count: int, share: float) -> IndexArray:
     """Pick rows that are independent of the given ones and of each other, early ones first where they do.
 
     Parameters
@@ -263,6 +289,8 @@ def independent_rows(matrix: FloatArray, given: FloatArray, count: int) -> Index
         Independent rows.
     count : int
         How many to pick.
+    share : float
+        Of the largest pivot, from which on an earlier row is taken.
     """
     basis = scipy.linalg.qr(given.T, mode="economic")[0] if len(given) else np.zeros((matrix.shape[1], 0))
     rest = matrix.copy()
@@ -272,7 +300,7 @@ def independent_rows(matrix: FloatArray, given: FloatArray, count: int) -> Index
     for _ in range(count):
         length = np.linalg.norm(rest, axis=1)
         length[picked] = 0.0
-        row = int(np.argmax(length > PIVOT_SHARE * length.max()))
+        row = int(np.argmax(length > share * length.max()))
         direction = rest[row] / length[row]
         direction -= basis @ (basis.T @ direction)
         direction /= np.linalg.norm(direction)
@@ -306,13 +334,13 @@ def _with_rows_replaced(
     for item, shift in zip(eliminations, shifts, strict=True):
         h = item.row
         row, square = values[:, h].copy(), squares[:, h].copy()
-        for source, x, error, by in zip(item.sources, item.multipliers, item.errors, shift, strict=True):
-            if x == 0.0:
-                continue
-            term = x * system.coefficients[:, source]
-            row[by : by + k] -= term
-            uncertain = (error * system.coefficients[:, source]) ** 2 + (EPS * term) ** 2
-            square[by : by + k] += x**2 * system.variance[:, source] + uncertain
+        for by in np.unique(shift[item.multipliers != 0.0]).tolist():
+            chosen = (item.multipliers != 0.0) & (shift == by)
+            x, sources = item.multipliers[chosen], item.sources[chosen]
+            terms, errors = system.coefficients[:, sources], item.errors[chosen]
+            row[by : by + k] -= np.einsum("i,kij->kj", x, terms)
+            square[by : by + k] += np.einsum("i,kij->kj", x**2, system.variance[:, sources])
+            square[by : by + k] += np.einsum("i,kij->kj", errors**2 + (EPS * x) ** 2, terms**2)
         square += (EPS * row) ** 2
         power = offsets.unknowns[item.columns] - offsets.equations[h]
         tight = (power >= 0) & (power < len(row))

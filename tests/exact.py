@@ -3,6 +3,7 @@
 A float is a rational number, so every model here has an exact determinant, order and transfer function.
 """
 
+from collections.abc import Iterable
 from fractions import Fraction
 
 import flint
@@ -31,10 +32,15 @@ def fraction(value: flint.fmpq) -> Fraction:
 
 
 def determinant(M: npt.ArrayLike, C: npt.ArrayLike, K: npt.ArrayLike) -> flint.fmpq_poly:
-    """Find ``det(K + C s + M s^2)`` by interpolation at 2n + 1 integers."""
-    coefficients = rational_matrix(K), rational_matrix(C), rational_matrix(M)
-    points = list(range(2 * coefficients[0].nrows() + 1))
-    return _interpolated(points, [_value(coefficients, s).det() for s in points])
+    """Find ``det(K + C s + M s^2)``."""
+    return polynomial_determinant([K, C, M])
+
+
+def polynomial_determinant(coefficients: Iterable[npt.ArrayLike]) -> flint.fmpq_poly:
+    """Find the determinant of a matrix polynomial by interpolation at as many integers as its degree needs."""
+    parts = [rational_matrix(part) for part in coefficients]
+    points = list(range((len(parts) - 1) * parts[0].nrows() + 1))
+    return _interpolated(points, [_value(parts, s).det() for s in points])
 
 
 def order(M: npt.ArrayLike, C: npt.ArrayLike, K: npt.ArrayLike) -> int:
@@ -117,9 +123,11 @@ def _beside(blocks: list[Rational], rows: int) -> Rational:
     return joined
 
 
-def _value(coefficients: tuple[Rational, Rational, Rational], s: int) -> Rational:
-    K, C, M = coefficients
-    return K + C * flint.fmpq(s) + M * flint.fmpq(s * s)
+def _value(coefficients: list[Rational], s: int) -> Rational:
+    value = coefficients[-1]
+    for part in reversed(coefficients[:-1]):
+        value = value * flint.fmpq(s) + part
+    return value
 
 
 def _interpolated(points: list[int], values: list[flint.fmpq]) -> flint.fmpq_poly:
