@@ -106,7 +106,7 @@ def test_null_spaces_name_equations_and_unknowns_apart() -> None:
 
 @given(seed=SEEDS, size=st.integers(2, 5))
 def test_free_unknowns_are_those_of_the_exact_null_space(seed: int, size: int) -> None:
-    """The unknowns with an entry in the rational null vectors of P(s) at a generic point, and likewise the equations."""
+    """The unknowns with an entry in the rational null vectors of P(s) at some point, and likewise the equations."""
     generator = np.random.default_rng(seed)
     factor = generator.integers(-2, 3, (3, size, size - 1)) * (generator.random((3, size, size - 1)) < 0.6)
     P = factor @ (generator.integers(-2, 3, (size - 1, size)) * (generator.random((size - 1, size)) < 0.6))

@@ -200,14 +200,14 @@ def test_far_units_of_time_and_inputs_are_undone(power: int) -> None:
     tau, size, one = 10.0**power, 10.0 ** (5 * abs(power) // 2), rod()
     states, equations = solved(mechss(one.M * tau**2, None, one.K, np.eye(3) * size))
     assert states == ((0, 0), (0, 1))
-    assert_allclose(equations.A, [[0, 1], [-30 / tau**2, 0]], rtol=ROUNDOFF)
+    assert_allclose(equations.A, np.array([[0, 1], [-30 / tau**2, 0]]), rtol=ROUNDOFF)
     assert_allclose(equations.displacement.U[2][2] / size / tau**2, [0, 0, -2 / 3], rtol=ROUNDOFF)
 
 
 def test_condition_of_the_levels_is_reported() -> None:
     """``rcond`` is the smallest of the systems that were solved: here that of the constraints, nearly dependent."""
     M, K = np.diag([1.0, 1, 1, 0, 0]), np.zeros((5, 5))
-    K[3:, :3] = [[1, -1, 0], [1, -1, 1e-4]]
+    K[3:, :3] = np.array([[1, -1, 0], [1, -1, 1e-4]])
     K[:3, 3:] = K[3:, :3].T
     assert 1e-10 < realization(mechss(M, None, K + np.diag([1.0, 2, 3, 0, 0])))[0].rcond < 1e-7
     assert realization(rod())[0].rcond > 0.01

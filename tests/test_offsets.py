@@ -26,7 +26,7 @@ def coefficients(model: SecondOrderModel) -> npt.NDArray[np.float64]:
 def drawn(seed: int, size: int, powers: int = 3) -> BoolArray:
     """Draw which coefficients are present, about a third."""
     generator = np.random.default_rng(seed)
-    return generator.random((powers, size, size)) < generator.choice([0.2, 0.35, 0.6])
+    return np.asarray(generator.random((powers, size, size)) < generator.choice([0.2, 0.35, 0.6]))
 
 
 def degrees(present: BoolArray) -> npt.NDArray[np.int64]:
@@ -38,7 +38,8 @@ def degrees(present: BoolArray) -> npt.NDArray[np.int64]:
 def best_matching(present: BoolArray) -> int:
     """Give the largest sum of degrees over all permutations."""
     degree = degrees(present)
-    return max(sum(degree[i, j] for i, j in enumerate(order)) for order in permutations(range(len(degree))))
+    every = permutations(range(len(degree)))
+    return max(sum(int(degree[i, j]) for i, j in enumerate(order)) for order in every)
 
 
 @pytest.mark.parametrize(
