@@ -61,7 +61,9 @@ ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
-LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves
+LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves ...
+LOSS_LOOKED_FOR = 1e-3  #: ... and in models that are cheap to solve W with a smaller rcond than this
+CHEAP = 60  #: DOFs of these models
 LARGEST_CERTIFIED = 500  #: DOFs up to which a sparse model with mixed coordinates is reduced densely
 LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
@@ -468,7 +470,8 @@ def _warned(reduction: ExactReduction) -> ExactReduction:
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     equations = reduction.equations
-    if reduction.rcond < LOSS_SUSPECTED and reduction.tol is None and not isinstance(equations, SparseReduction):
+    suspect = LOSS_LOOKED_FOR if len(reduction.model.dofs) <= CHEAP else LOSS_SUSPECTED
+    if reduction.rcond < suspect and reduction.tol is None and not isinstance(equations, SparseReduction):
         _warn_of_lost_digits(loss(reduction.model, equations), reduction.rcond)
     return reduction
 

@@ -201,7 +201,8 @@ class _Block:
         values = scipy.linalg.svdvals(scaled.matrix)
         bound = values[0] * (RANK_TOLERANCE * rows.size if tol is None else tol)
         bound = max(float(bound), caution.rank * float(np.sqrt(variance.sum())))
-        bound = gap_threshold(values, bound, bound * UNCLEAR)
+        if tol is None:
+            bound = gap_threshold(values, bound, bound * UNCLEAR)
         decision = BlockDecision(
             unknowns=columns,
             singular_values=values,

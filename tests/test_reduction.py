@@ -273,6 +273,7 @@ def prescribed(structure: Structure, dof: int) -> SecondOrderModel:
     )
 
 
+@pytest.mark.filterwarnings("ignore:The state space is exact")
 @given(structure=structures(smallest=2, largest=7), dof=st.integers(0, 6))
 def test_input_derivatives_are_absorbed_where_the_output_is_proper(structure: Structure, dof: int) -> None:
     """With Bv, Ba, Dv, Da the state space equals the exact model(s) on every proper channel."""
