@@ -99,7 +99,7 @@ def bode_plot(
     ----------
     sysdata : control.StateSpace or SecondOrderModel
         The curve is `frequency_response` of the state space, for a model that of `mech2ss` of it. Where a
-        model has none (complex, improper, W singular) the curve is its descriptor form, and the legend says so.
+        model has none (complex, improper, order uncertain) the curve is its descriptor form, and the legend says so.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points (two are two points, not limits); also with `Hz`. By default a
         grid around the poles.

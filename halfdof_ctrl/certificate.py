@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.offsets import IndexArray
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import StateEquations
 from halfdof_ctrl.spectrum import balanced_states
@@ -22,7 +21,6 @@ NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time s
 BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
 DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
 SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
-SHARE = 1e-8  #: entries of null vectors above this are not rounding
 AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
 DOUBT = 4 * float(np.finfo(float).eps)  #: times n and the condition of P(s): differences that a direct solve may make
 
@@ -52,18 +50,6 @@ class ScaledPencil:
     def is_singular(self) -> bool:
         """Whether P(s) is singular to working precision at all points."""
         return all(self._smallest(s) <= SINGULAR * self.P.shape[1] for s in NEAR)
-
-    def null_spaces(self) -> tuple[IndexArray, IndexArray]:
-        """Give the equations that are dependent and the unknowns that can move freely, at a generic point.
-
-        A left null vector combines the one, a right one moves the other, and another basis of the null spaces
-        has the same entries that are not zero.
-        """
-        left, values, right = np.linalg.svd(self._scaled(NEAR[0]))
-        null = values <= SINGULAR * values.size * max(float(values[0]), 1.0)
-        shares = np.abs(left[:, null]).max(axis=1, initial=0.0), np.abs(right[null]).max(axis=0, initial=0.0)
-        equations, unknowns = (np.flatnonzero(share > SHARE) for share in shares)
-        return equations, unknowns
 
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""

@@ -11,13 +11,15 @@ from typing import Literal
 import numpy as np
 
 from halfdof_ctrl.arrays import FloatArray
-from halfdof_ctrl.certificate import ScaledPencil
+from halfdof_ctrl.certificate import NEAR, ScaledPencil
 from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
+from halfdof_ctrl.nullspaces import causes, null_spaces
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
+from halfdof_ctrl.refusals import singular_pencil_error
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.spectrum import balanced
@@ -62,9 +64,14 @@ class StateSelection:
         """DOFs without a state: they follow from the others and the inputs."""
         return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
 
-    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
         """Tell for each of the model's DOFs with less than two states whether it is half or static."""
         return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
+
+    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Give the states that belong to displacements and velocities of all n DOFs; higher derivatives are zero."""
+        from_q, from_v = self.state_maps()[:2]
+        return np.asarray(from_q @ displacements + from_v @ velocities)
 
     def state_maps(self) -> tuple[FloatArray, ...]:
         """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""
@@ -199,14 +206,13 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 
 
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
-    equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
-    msg = (
-        f"The pencil is singular: det P(s) vanishes at every s, to working precision. DOFs {listed(unknowns)} can move "
-        f"in any way without a force, and the equations of {listed(equations)} depend on each other: a node without "
-        "spring, damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant "
-        "or give it a stiffness."
+    null = null_spaces(pencil.at(NEAR[0])[0])
+    return singular_pencil_error(
+        dofs=_names(model, np.array(sorted(frozenset().union(*null.unknowns)), dtype=np.intp)),
+        equations=_names(model, np.array(sorted(frozenset().union(*null.equations)), dtype=np.intp)),
+        fact="to working precision",
+        causes=causes(null, (model.K, model.C, model.M), model.dofs),
     )
-    return SingularPencilError(msg, dofs=unknowns, equations=equations)
 
 
 def _uncertain_error(

@@ -196,7 +196,7 @@ def signals_of(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
 def poles_of(system: System) -> ComplexArray:
     """Compute the poles, sorted by size and conjugate pairs with the positive imaginary part first.
 
-    Those of a model that has no state space (complex, or W singular) are its finite eigenvalues.
+    Those of a model that has no state space (complex, or of an order that is uncertain) are its finite eigenvalues.
 
     Raises
     ------

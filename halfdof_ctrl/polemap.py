@@ -44,7 +44,7 @@ def pole_map_plot(
     sysdata : control.StateSpace or SecondOrderModel
         Crosses are the eigenvalues of A. For a model, open circles are the finite eigenvalues of its
         pencil (`pencil_structure`), the legend says how many infinite ones were deflated, and the zeros are `zeros`
-        of it. Where a model has no A (complex, W singular) there are circles alone.
+        of it. Where a model has no A (complex, order uncertain) there are circles alone.
     feedback : StateFeedback, optional
         A design of `lqr`, whose closed-loop poles are drawn beside.
     ax : Axes, optional

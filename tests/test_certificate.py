@@ -90,6 +90,7 @@ def test_matrix_of_zeros_is_singular() -> None:
     """Nothing to scale, nothing to divide by."""
     pencil = pencil_of(mechss(np.zeros((2, 2)), None, None))
     assert pencil.is_singular()
+<<<<<<< HEAD
     assert [places.tolist() for places in pencil.null_spaces()] == [[0, 1], [0, 1]]
 
 
@@ -115,6 +116,8 @@ def test_free_unknowns_are_those_of_the_exact_null_space(seed: int, size: int) -
     for found, matrix in ((unknowns, value), (equations, value.T)):
         basis = exact.null_space(exact.rational_matrix(matrix))
         assert found.tolist() == [i for i in range(size) if any(basis[i, k] != 0 for k in range(basis.ncols()))]
+=======
+>>>>>>> main
 
 
 def lost(model: SecondOrderModel, disturbance: float) -> Losses:

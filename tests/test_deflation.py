@@ -197,7 +197,7 @@ def test_what_is_not_connected_stays_exactly_apart() -> None:
 @pytest.mark.parametrize("power", [-60, -20, 20, 60])
 def test_far_units_of_time_and_inputs_are_undone(power: int) -> None:
     """Seconds of 1e-60 to 1e60, inputs of up to 1e150: the rod keeps its closed form, without an overflow."""
-    tau, size, one = 10.0**power, 10.0 ** (5 * abs(power) // 2), rod()
+    tau, size, one = float(10.0**power), float(10.0 ** (5 * abs(power) // 2)), rod()
     states, equations = solved(mechss(one.M * tau**2, None, one.K, np.eye(3) * size))
     assert states == ((0, 0), (0, 1))
     assert_allclose(equations.A, np.array([[0, 1], [-30 / tau**2, 0]]), rtol=ROUNDOFF)

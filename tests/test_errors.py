@@ -17,6 +17,7 @@ from halfdof_ctrl.errors import (
     LostDigitsWarning,
     MatrixError,
     MissingExtraError,
+    ModelSizeError,
     NearlyMasslessWarning,
     ParameterError,
     SignalNameError,
@@ -44,6 +45,7 @@ EXAMPLES: list[HalfdofError] = [
     FileFormatError("truncated", path="model.mtx", line=3),
     MissingExtraError("needs h5py", path="model.mat", extra="hdf5"),
     WorkerError("cannot start", function="hydromount"),
+    ModelSizeError("too many states", size=400_000, limit=8192),
 ]
 
 
