@@ -90,34 +90,6 @@ def test_matrix_of_zeros_is_singular() -> None:
     """Nothing to scale, nothing to divide by."""
     pencil = pencil_of(mechss(np.zeros((2, 2)), None, None))
     assert pencil.is_singular()
-<<<<<<< HEAD
-    assert [places.tolist() for places in pencil.null_spaces()] == [[0, 1], [0, 1]]
-
-
-def test_null_spaces_name_equations_and_unknowns_apart() -> None:
-    """Equations 0 and 1 are one and the same; unknown 2 stands in none of them, 3 follows it no more than it must."""
-    M, K = np.zeros((4, 4)), np.zeros((4, 4))
-    M[0, 0] = M[1, 0] = 1.0
-    K[0, 1] = K[1, 1] = 2.0
-    K[2, 0], K[3, 1], K[3, 3], K[2, 1] = 1.0, 1.0, 5.0, 4.0
-    equations, unknowns = pencil_of(mechss(M, None, K)).null_spaces()
-    assert equations.tolist() == [0, 1]
-    assert unknowns.tolist() == [2]
-
-
-@given(seed=SEEDS, size=st.integers(2, 5))
-def test_free_unknowns_are_those_of_the_exact_null_space(seed: int, size: int) -> None:
-    """The unknowns with an entry in the rational null vectors of P(s) at some point, and likewise the equations."""
-    generator = np.random.default_rng(seed)
-    factor = generator.integers(-2, 3, (3, size, size - 1)) * (generator.random((3, size, size - 1)) < 0.6)
-    P = factor @ (generator.integers(-2, 3, (size - 1, size)) * (generator.random((size - 1, size)) < 0.6))
-    equations, unknowns = pencil_of(mechss(P[2], P[1], P[0])).null_spaces()
-    value = P[0] + 7 * P[1] + 49 * P[2]
-    for found, matrix in ((unknowns, value), (equations, value.T)):
-        basis = exact.null_space(exact.rational_matrix(matrix))
-        assert found.tolist() == [i for i in range(size) if any(basis[i, k] != 0 for k in range(basis.ncols()))]
-=======
->>>>>>> main
 
 
 def lost(model: SecondOrderModel, disturbance: float) -> Losses:
