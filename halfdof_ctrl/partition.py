@@ -299,8 +299,9 @@ def _null_split(
 ) -> tuple[_Span, _Span, list[RankDecision]]:
     """Split a span of d vectors into a part where `product` (n, d) has full rank and its null space.
 
-    A mixed column is known to rounding of the largest entry that its DOF has in the block, times the spread
-    of the singular values that count; a column that is taken over is as exact as it was.
+    A mixed column of the null space is known to rounding of the largest entry that its DOF has in the block, times
+    the spread of the singular values that count; one of the other part may be any, so rounding alone counts. A column
+    that is taken over is as exact as it was.
     """
     nothing = span.part(np.zeros(0, dtype=np.intp))
     ranging, null, evidence = [nothing], [nothing], []
@@ -330,8 +331,8 @@ def _null_split(
         speck = 4 * max(part.shape) * np.finfo(float).eps * spread
         clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
         mixed = own.columns @ (factors[:, None] * clean)
-        size = (own.sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True) * spread
-        whole = _Span(mixed, np.repeat(size, block.size, axis=1))
+        size = (own.sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True)
+        whole = _Span(mixed, size * np.where(np.arange(block.size) < rank, 1.0, spread))
         ranging.append(whole.part(np.arange(rank)))
         null.append(whole.part(np.arange(rank, block.size)))
     return _joined(ranging), _joined(null), evidence

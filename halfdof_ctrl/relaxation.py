@@ -198,9 +198,15 @@ class _Block:
         scaled = levelled(system, offsets, J, rows, columns)
         factors = scaled.rows[:, None] * scaled.columns
         variance = offsets.tight(system.variance[:, :, : system.size])[place] * factors**2
-        values = scipy.linalg.svdvals(scaled.matrix)
-        bound = values[0] * (RANK_TOLERANCE * rows.size if tol is None else tol)
-        bound = max(float(bound), caution.rank * float(np.sqrt(variance.sum())))
+        matrix, row_factors = scaled.matrix, scaled.rows
+        values = scipy.linalg.svdvals(matrix)
+        bound = float(values[0]) * (RANK_TOLERANCE * rows.size if tol is None else tol)
+        noise = caution.rank * np.sqrt(rows.size * variance.sum(axis=1))
+        if noise.max() > bound:  # no row may be known to less than the bound
+            weights = bound / np.maximum(noise, bound)
+            matrix, row_factors = matrix * weights[:, None], row_factors * weights
+            variance = variance * weights[:, None] ** 2
+            values = scipy.linalg.svdvals(matrix)
         if tol is None:
             bound = gap_threshold(values, bound, bound * UNCLEAR)
         decision = BlockDecision(
@@ -213,9 +219,9 @@ class _Block:
             rows=rows,
             columns=columns,
             times=offsets.equations[rows],
-            matrix=scaled.matrix,
+            matrix=matrix,
             variance=variance,
-            row_factors=scaled.rows,
+            row_factors=row_factors,
             decision=decision,
         )
 

@@ -38,8 +38,7 @@ def degrees(present: BoolArray) -> npt.NDArray[np.int64]:
 def best_matching(present: BoolArray) -> int:
     """Give the largest sum of degrees over all permutations."""
     degree = degrees(present)
-    every = permutations(range(len(degree)))
-    return max(sum(int(degree[i, j]) for i, j in enumerate(order)) for order in every)
+    return max(sum(int(degree[i, j]) for i, j in enumerate(order)) for order in permutations(range(len(degree))))
 
 
 @pytest.mark.parametrize(
