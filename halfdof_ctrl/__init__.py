@@ -4,7 +4,7 @@ from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, zeros
 from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.errors import HalfdofError
-from halfdof_ctrl.files import load_model, load_system, save_model, save_response, save_system
+from halfdof_ctrl.files import inspect_files, load_model, load_system, save_model, save_response, save_system
 from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.mounts import hydromount
 from halfdof_ctrl.plots import (
@@ -42,6 +42,7 @@ __all__ = [
     "exact_reduction",
     "frequency_response",
     "hydromount",
+    "inspect_files",
     "load_model",
     "load_system",
     "lqr",

@@ -21,6 +21,7 @@ from typing import TypeAlias
 import control
 import numpy as np
 
+from halfdof_ctrl.containers import MATRIX_ENDINGS, ending
 from halfdof_ctrl.crosscheck import crosscheck
 from halfdof_ctrl.descriptor import pencil_structure
 from halfdof_ctrl.design import StateFeedback, lqr
@@ -28,9 +29,8 @@ from halfdof_ctrl.eigentable import eigenvalue_table
 from halfdof_ctrl.errors import FileFormatError, HalfdofError, ParameterError
 from halfdof_ctrl.files import (
     GAIN_ENDINGS,
-    MATRIX_ENDINGS,
     TABLE_ENDINGS,
-    ending,
+    inspect_files,
     load_model,
     replacing,
     save_gain,
@@ -58,6 +58,7 @@ BUILT_IN_SIGNALS: dict[str, _Signals] = {
     "hydromount": (("F_y",), ("y", "y_dot"))
 }  #: what is shown unless the user asks for others
 BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
+LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
 FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
@@ -100,8 +101,13 @@ def _report(arguments: argparse.Namespace) -> int:
 
 
 def _info(arguments: argparse.Namespace) -> int:
+    if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
+        print(inspect_files(arguments.model), flush=True)
     model = _model(arguments)
     print(model)
+    if len(model.dofs) > LARGEST_PENCIL:
+        print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+        return DONE
     structure = pencil_structure(model)
     kind = "regular" if structure.is_regular else "SINGULAR"
     print(
@@ -340,7 +346,7 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     add = functools.partial(_add_command, commands)
     add("report", _report, "write a page, figures, the state space and the check into a folder", "FOLDER", needed=True)
-    add("info", _info, "print the model, its pencil and its reduction", None)
+    add("info", _info, "print what is in the files, the model, its pencil and its reduction", None)
     add("ss", _ss, "print the state space, or write it (npz, mat)", "FILE")
     bode = add("bode", _bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
@@ -382,7 +388,11 @@ def _add_command(
         name, help=purpose, description=f"{purpose[0].upper()}{purpose[1:]}.", allow_abbrev=False
     )
     parser.set_defaults(command=command)
-    parser.add_argument("model", metavar="MODEL", help=f"a file (npz, mat) or a built-in model: {', '.join(BUILT_IN)}")
+    parser.add_argument(
+        "model",
+        metavar="MODEL",
+        help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
+    )
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
     parser.set_defaults(inputs=None, outputs=None)
     if signals:

@@ -5,7 +5,9 @@ The attributes repeat the facts for programs.
 """
 
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
@@ -134,11 +136,46 @@ class StabilizationError(HalfdofError):
 
 
 class FileFormatError(HalfdofError):
-    """A file cannot be read as a model, or its ending names no known format; `path` is the file."""
+    """A file cannot be read as a model, or its ending names no known format.
 
-    def __init__(self, message: str, *, path: str) -> None:
+    `path` is the file, `line` the line that is wrong, counted from one, where a text file has a single one.
+    """
+
+    def __init__(self, message: str, *, path: str, line: int | None = None) -> None:
         super().__init__(message)
         self.path = path
+        self.line = line
+
+
+class MissingExtraError(FileFormatError):
+    """A file needs a package that is not installed; `extra` is what to install it by."""
+
+    def __init__(self, message: str, *, path: str, extra: str) -> None:
+        super().__init__(message, path=path)
+        self.extra = extra
+
+
+@contextmanager
+def naming_the_file(path: object) -> Iterator[None]:
+    """Turn what goes wrong with a file's content into a refusal that names the file."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
+            yield
+    except MissingExtraError as refusal:
+        msg = f"{path}: {refusal}"
+        raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal
+    except HalfdofError as refusal:
+        line = getattr(refusal, "line", None)
+        words = " ".join(str(refusal).splitlines())
+        msg = f"{path}{'' if line is None else f', line {line}'}: {words}"
+        raise FileFormatError(msg, path=str(path), line=line) from refusal
+    except OSError:
+        raise
+    except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
+        reason = " ".join(str(cause).split()) or type(cause).__name__
+        msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
+        raise FileFormatError(msg, path=str(path)) from cause
 
 
 class WorkerError(HalfdofError):
@@ -179,3 +216,7 @@ class LostDigitsWarning(UserWarning):
 
 class FailedCasesWarning(UserWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
+
+
+class ImportedModelWarning(UserWarning):
+    """What a finite-element program wrote is read as it stands, but is probably not what was meant."""

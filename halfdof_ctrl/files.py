@@ -3,6 +3,7 @@
 | what | endings | content |
 |---|---|---|
 | model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed if there), dofs, inputs, outputs, name |
+| model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `modelimport` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
 | response | .csv | one row a frequency or time, see `save_response` |
@@ -15,8 +16,6 @@ import csv
 import io
 import os
 import secrets
-import warnings
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
@@ -26,25 +25,37 @@ from typing import Any, BinaryIO, TypeAlias
 import control
 import numpy as np
 import scipy.io
+from scipy.sparse import issparse
 
 from halfdof_ctrl.arrays import checked_matrix
+from halfdof_ctrl.containers import (
+    MATRIX_ENDINGS,
+    Content,
+    PathLike,
+    ending,
+    load_variables,
+    single_text,
+    sparse_parts,
+    texts,
+)
+from halfdof_ctrl.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.design import StateFeedback
-from halfdof_ctrl.errors import FileFormatError, HalfdofError
-from halfdof_ctrl.matfile import MOST_BYTES, read_mat
+from halfdof_ctrl.errors import FileFormatError, naming_the_file
+from halfdof_ctrl.importreport import ImportReport
 from halfdof_ctrl.model import LETTERS, SecondOrderModel, mechss
-from halfdof_ctrl.names import checked_names, listed, name_from_label
+from halfdof_ctrl.modelimport import container_report, filled, import_model, import_report
+from halfdof_ctrl.names import checked_names, listed
+from halfdof_ctrl.rawmatrix import Triangle
+from halfdof_ctrl.tables import frequency_table, time_table
 
-PathLike: TypeAlias = str | os.PathLike[str]
-Content: TypeAlias = Mapping[str, Any]
+Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
 
-MATRIX_ENDINGS = (".npz", ".mat")
 TABLE_ENDINGS = (".csv",)
 GAIN_ENDINGS = (*MATRIX_ENDINGS, *TABLE_ENDINGS)
 OPTIONAL_LETTERS = ("Bv", "Ba", "Dv", "Da")  #: written only where they are not zero
 MODEL_NAMES = ("dofs", "inputs", "outputs")
 SYSTEM_LETTERS = ("A", "B", "C", "D")
 SYSTEM_NAMES = ("states", "inputs", "outputs")
-ZIP_HEADER = b"PK\x03\x04"
 UNKNOWN_PERIOD = -1.0  #: MATLAB's Ts of a sampled system without a period, True in python-control
 
 
@@ -79,40 +90,74 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     _save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
 
 
-def load_model(path: PathLike) -> SecondOrderModel:
-    """Read a model from a file.
+def load_model(
+    path: Paths,
+    *,
+    triangle: Triangle | None = None,
+    remove_fixed: bool = False,
+    matrices: Mapping[str, str] | None = None,
+) -> SecondOrderModel:
+    """Read a model from a file, or from the files that a finite-element program wrote.
 
     Parameters
     ----------
-    path : path-like
-        An ``.npz`` or MATLAB version 5 ``.mat`` file with K, and any of M, C, B, F, G, H, D, Bv, Ba, Dv, Da
-        (dense or sparse in ``.mat``), ``dofs``, ``inputs``, ``outputs``, ``prescribed`` (text arrays; in ``.mat``
-        cell or char arrays) and ``name``. What is missing is as in `mechss`; other variables are not looked at.
+    path : path-like, sequence of path-like, or mapping from letter to path-like
+        An ``.npz`` or MATLAB ``.mat`` file with K, and any of M, C, B, F, G, H, D, Bv, Ba, Dv, Da (full or
+        sparse), ``dofs``, ``inputs``, ``outputs``, ``prescribed`` (text arrays; in ``.mat`` cell or char arrays)
+        and ``name``. What is missing is as in `mechss`; other variables are not looked at. Version 7.3 needs the
+        extra ``hdf5``.
+
+        Or files of Matrix Market, Abaqus, ANSYS or Nastran: a folder that holds one model; one file, to which
+        those of the same name for M, C, K are found; a list of files; or ``{"K": path, "M": path, ...}`` where names
+        do not say what is what. S stands for structural damping, the imaginary part of K.
+    triangle : {"lower", "upper"}, optional
+        Says that matrices of which only this triangle is stored are symmetric. Not needed where the format says so.
+    remove_fixed : bool
+        Takes out DOFs whose stiffness is 1e35 or more, by which Abaqus writes boundary conditions.
+    matrices : mapping from letter to str, optional
+        Names of the matrices to take from files that hold several, ``{"K": "kaa", "M": "maa"}``.
 
     Returns
     -------
     SecondOrderModel
+        Its DOFs are named by node and component (``n101_u1``) where the files have labels.
 
     Raises
     ------
     FileFormatError
-        Another ending, damaged, of another kind, with objects or text for numbers, or a model that
-        `mechss` refuses; the message starts with the file and the cause is the refusal.
+        An unknown format, damaged, of another kind, with objects or text for numbers, no stiffness, matrices that do
+        not fit together, or a model that `mechss` refuses; the message starts with the file, the cause is the refusal.
+    MissingExtraError
+        A MATLAB 7.3 file where h5py is not installed.
     OSError
-        The file is not there or cannot be read.
+        A file is not there or cannot be read.
+
+    Warns
+    -----
+    ImportedModelWarning
+        What a finite-element program wrote is probably not what was meant: a triangle is missing, boundary conditions
+        are huge springs, DOFs have mass and no stiffness, there is no file with damping beside the one that was given.
+
+    See Also
+    --------
+    inspect_files : what is in the files, as a table
     """
-    content = _load_matrices(path, (*LETTERS, *MODEL_NAMES, "prescribed", "name"))
+    if not _is_container(path):
+        return import_model(_as_paths(path), triangle=triangle, remove_fixed=remove_fixed, matrices=matrices)
+    path = _single(path)
+    content = load_variables(path, (*LETTERS, *MODEL_NAMES, "prescribed", "name"))
     if "K" not in content:
         found = f"it has {listed(sorted(content))}" if content else "it has none of a model's letters"
         msg = f"{path}: no stiffness K in the file ({found}). A model file holds M, C and K, capital letters."
         raise FileFormatError(msg, path=str(path))
-    with _naming_the_file(path):
-        matrices: dict[str, Any] = {letter: content.get(letter) for letter in LETTERS}
-        names: dict[str, Any] = {key: _texts(content, key) for key in MODEL_NAMES}
-        prescribed = _texts(content, "prescribed")
+    with naming_the_file(path):
+        values: dict[str, Any] = {letter: content.get(letter) for letter in LETTERS}
+        values |= {letter: filled(letter, values[letter], triangle) for letter in "MCK"}
+        names: dict[str, Any] = {key: texts(content, key) for key in MODEL_NAMES}
+        prescribed = texts(content, "prescribed")
         if not prescribed:
-            return mechss(**matrices, **names, name=_single_text(content))
-        return _with_prescribed(mechss(**matrices, dofs=names["dofs"], name=_single_text(content)), names, prescribed)
+            return mechss(**values, **names, name=single_text(content))
+        return _with_prescribed(mechss(**values, dofs=names["dofs"], name=single_text(content)), names, prescribed)
 
 
 def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescribed: Sequence[str]) -> SecondOrderModel:
@@ -122,6 +167,48 @@ def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescrib
         for key in ("inputs", "outputs")
     }
     return replace(model, **signals, prescribed=checked_names(prescribed, len(prescribed), "prescribed DOFs"))
+
+
+def inspect_files(
+    path: Paths,
+    *,
+    triangle: Triangle | None = None,
+    remove_fixed: bool = False,
+    matrices: Mapping[str, str] | None = None,
+    largest: int = LARGEST_COMPONENT,
+) -> ImportReport:
+    """Look at what `load_model` would read: sizes, symmetry, rank, mass per direction, kinds of DOFs.
+
+    Parameters
+    ----------
+    path, triangle, remove_fixed, matrices
+        As in `load_model`.
+    largest : int
+        Connected parts of a matrix with more DOFs than this are not factorized, and their rank stays unknown.
+
+    Returns
+    -------
+    ImportReport
+        Prints as a small table.
+
+    Raises
+    ------
+    FileFormatError, OSError
+        As in `load_model`; a missing stiffness is told in the report.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_model(hydromount(), f"{folder}/mount.npz")
+    ...     inspect_files(f"{folder}/mount.npz").matrices[0].rank
+    'positive semidefinite, rank 1'
+    """
+    if _is_container(path):
+        return container_report(Path(_single(path)), triangle=triangle, largest=largest)
+    return import_report(
+        _as_paths(path), triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest
+    )
 
 
 def save_system(sys: control.StateSpace, path: PathLike) -> None:
@@ -157,12 +244,12 @@ def load_system(path: PathLike) -> control.StateSpace:
     OSError
         The file is not there or cannot be read.
     """
-    content = _load_matrices(path, (*SYSTEM_LETTERS, *SYSTEM_NAMES, "name", "dt"))
+    content = load_variables(path, (*SYSTEM_LETTERS, *SYSTEM_NAMES, "name", "dt"))
     missing = [letter for letter in SYSTEM_LETTERS if letter not in content]
     if missing:
         msg = f"{path}: {listed(missing)} not in the file. A state space file holds A, B, C and D."
         raise FileFormatError(msg, path=str(path))
-    with _naming_the_file(path):
+    with naming_the_file(path):
         return _system(content)
 
 
@@ -204,17 +291,29 @@ def save_response(data: control.FrequencyResponseData | control.TimeResponseData
         The file cannot be written.
     """
     ending(path, TABLE_ENDINGS)
-    header, columns = _time_table(data) if isinstance(data, control.TimeResponseData) else _frequency_table(data)
+    header, columns = time_table(data) if isinstance(data, control.TimeResponseData) else frequency_table(data)
     _save_table(path, header, (map(repr, row) for row in np.column_stack(columns).tolist()))
 
 
-def ending(path: PathLike, known: Sequence[str]) -> str:
-    """Give the ending of a path in small letters, and refuse one that is not known."""
-    suffix = Path(path).suffix.lower()
-    if suffix not in known:
-        msg = f"{path}: the ending {suffix or '(none)'} names no format for this. Use {', '.join(known)}."
-        raise FileFormatError(msg, path=str(path))
-    return suffix
+def _is_container(path: Paths) -> bool:
+    """Tell whether it is one file that names its matrices."""
+    one = path if isinstance(path, str | os.PathLike) else next(iter(path)) if len(path) == 1 else None
+    return isinstance(one, str | os.PathLike) and Path(one).suffix.lower() in MATRIX_ENDINGS
+
+
+def _single(path: Paths) -> PathLike:
+    return path if isinstance(path, str | os.PathLike) else next(iter(path))
+
+
+def _as_paths(path: Paths) -> list[Path] | dict[str, Path]:
+    if isinstance(path, str | os.PathLike):
+        return [Path(path)]
+    if isinstance(path, Mapping):
+        return {letter: Path(one) for letter, one in path.items()}
+    if not path:
+        msg = "No file is given. Give at least the stiffness."
+        raise FileFormatError(msg, path="")
+    return [Path(one) for one in path]
 
 
 @contextmanager
@@ -249,16 +348,16 @@ def naming_target(path: PathLike) -> Iterator[None]:
 
 def _save_matrices(path: PathLike, content: Content, names: Mapping[str, Sequence[str]], name: str | None) -> None:
     suffix = ending(path, MATRIX_ENDINGS)
-    for text in (*(text for texts in names.values() for text in texts), name or ""):
+    for text in (*(text for group in names.values() for text in group), name or ""):
         if any(ord(letter) < ord(" ") or "\ud800" <= letter <= "\udfff" for letter in text):
             msg = f"{path}: the name {text!r} holds a control character, which files do not keep. Rename the signal."
             raise FileFormatError(msg, path=str(path))
     with replacing(path) as stream:
         if suffix == ".npz":
-            texts = {key: np.array(value, dtype=np.str_) for key, value in names.items()}
-            np.savez(
-                stream, allow_pickle=False, **content, **texts, **({} if name is None else {"name": np.array(name)})
-            )
+            parts = [sparse_parts(key, value) if issparse(value) else {key: value} for key, value in content.items()]
+            arrays: dict[str, Any] = {key: value for part in parts for key, value in part.items()}
+            arrays |= {key: np.array(value, dtype=np.str_) for key, value in names.items()}
+            np.savez(stream, allow_pickle=False, **arrays, **({} if name is None else {"name": np.array(name)}))
         else:
             cells = {key: np.array(value, dtype=object).reshape(1, -1) for key, value in names.items()}
             title = {} if name is None else {"name": name}
@@ -274,110 +373,6 @@ def _save_table(path: PathLike, header: Sequence[str], rows: Iterable[Iterable[s
         text.detach()
 
 
-def _frequency_table(data: control.FrequencyResponseData) -> tuple[list[str], list[Any]]:
-    omega = np.asarray(data.omega, dtype=float)
-    header, columns = ["omega [rad/s]", "f [Hz]"], [omega, omega / (2.0 * np.pi)]
-    values = np.asarray(data.frdata)
-    for i, result in enumerate(data.output_labels):
-        for j, cause in enumerate(data.input_labels):
-            channel = f"{name_from_label(result)}/{name_from_label(cause)}"
-            header += [f"{channel} {part}" for part in ("real", "imag", "magnitude", "phase [deg]")]
-            value = values[i, j]
-            columns += [value.real, value.imag, np.abs(value), np.degrees(_unwrapped(np.angle(value)))]
-    return header, columns
-
-
-def _unwrapped(phase: Any) -> Any:  # noqa: ANN401 - an array of floats, which control leaves untyped
-    """Remove jumps of whole turns, leaving out values at poles, which have no phase."""
-    known = np.isfinite(phase)
-    unwrapped = phase.copy()
-    unwrapped[known] = np.unwrap(phase[known])
-    return unwrapped
-
-
-def _time_table(data: control.TimeResponseData) -> tuple[list[str], list[Any]]:
-    time = np.asarray(data.t, dtype=float)
-    results = [name_from_label(label) for label in data.output_labels]
-    if data.ntraces:
-        causes = [name_from_label(label) for label in data.trace_labels or data.input_labels]
-        causes = [cause.removeprefix("From ") for cause in causes]
-        header = [f"{result}/{cause}" for result in results for cause in causes]
-    else:
-        header = results
-    histories = np.asarray(data.y, dtype=float).reshape(-1, time.size)
-    return ["t [s]", *header], [time, *histories]
-
-
-def _load_matrices(path: PathLike, wanted: Sequence[str]) -> Content:
-    """Read the wanted variables of a file; whatever a damaged file does to the readers is one refusal."""
-    read = _read_npz if ending(path, MATRIX_ENDINGS) == ".npz" else read_mat
-    if Path(path).exists() and not Path(path).is_file():
-        msg = f"{path}: this is no file. Give a file that ends in {' or '.join(MATRIX_ENDINGS)}."
-        raise FileFormatError(msg, path=str(path))
-    content = Path(path).read_bytes()
-    with _naming_the_file(path):
-        return read(content, wanted)
-
-
-@contextmanager
-def _naming_the_file(path: PathLike) -> Iterator[None]:
-    """Turn what goes wrong with a file's content into a refusal that names the file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parser of damaged headers; what is read gets checked
-            yield
-    except HalfdofError as refusal:
-        msg = f"{path}: {refusal}"
-        raise FileFormatError(msg, path=str(path)) from refusal
-    except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
-        reason = " ".join(str(cause).split()) or type(cause).__name__
-        msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
-        raise FileFormatError(msg, path=str(path)) from cause
-
-
-def _refused(msg: str) -> FileFormatError:
-    """Make a refusal that gets its file in `_naming_the_file`."""
-    return FileFormatError(msg, path="")
-
-
-def _read_npz(content: bytes, wanted: Sequence[str]) -> Content:
-    if not content.startswith(ZIP_HEADER):
-        msg = "this is no archive of arrays. Write it by numpy.savez(path, M=M, C=C, K=K)."
-        raise _refused(msg)
-    archive: Any = np.load(io.BytesIO(content), allow_pickle=False)
-    with archive, zipfile.ZipFile(io.BytesIO(content)) as members:
-        sizes = {info.filename.removesuffix(".npy"): info.file_size for info in members.infolist()}
-        found = [key for key in wanted if key in archive.files]
-        too_large = [key for key in found if sizes[key] > MOST_BYTES]
-        if too_large:
-            msg = (
-                f"{listed(too_large)} is larger than the {MOST_BYTES:.0e} bytes that are read. Reduce the model first."
-            )
-            raise _refused(msg)
-        return {key: archive[key] for key in found}
-
-
-def _texts(content: Content, key: str) -> list[str] | None:
-    """Give names, which are a text array in .npz and a list of texts from .mat."""
-    value = content.get(key)
-    if value is None or isinstance(value, list):
-        return value
-    array = np.asarray(value)
-    if array.size and array.dtype.kind not in "US":
-        msg = f"{key} must be names, but it holds entries of type {array.dtype}. Give text (in MATLAB a cellstr)."
-        raise _refused(msg)
-    texts = array.reshape(-1).tolist()
-    return [text.decode() if isinstance(text, bytes) else str(text) for text in texts]
-
-
-def _single_text(content: Content) -> str | None:
-    texts = _texts(content, "name") or [""]
-    if len(texts) > 1:
-        msg = f"name must be one text, but it has {len(texts)}."
-        raise _refused(msg)
-    return texts[0] or None
-
-
 def _system(content: Content) -> control.StateSpace:
     shapes = [np.shape(content[letter]) for letter in SYSTEM_LETTERS]
     n, m, p = ([*shape, 0, 0][axis] for shape, axis in ((shapes[0], 0), (shapes[3], 1), (shapes[3], 0)))
@@ -385,11 +380,11 @@ def _system(content: Content) -> control.StateSpace:
     matrices = [checked_matrix(content[key], key, size) for key, size in zip(SYSTEM_LETTERS, expected, strict=True)]
     labels: dict[str, Any] = {}
     for key, count in zip(SYSTEM_NAMES, (n, m, p), strict=True):
-        texts = _texts(content, key)
-        if texts is not None:
-            labels[key] = list(checked_names(texts, count, key))
+        found = texts(content, key)
+        if found is not None:
+            labels[key] = list(checked_names(found, count, key))
     if "dt" in content:
         period = float(np.asarray(content["dt"]).item())
         labels["dt"] = True if period == UNKNOWN_PERIOD else period
-    name = _single_text(content)
+    name = single_text(content)
     return control.StateSpace(*matrices, **labels, **({} if name is None else {"name": name}))

@@ -15,11 +15,13 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csc_array
 
 from halfdof_ctrl.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.errors import FileFormatError
+from halfdof_ctrl.rawmatrix import MOST_ROWS
 
-Value: TypeAlias = npt.NDArray[Any] | list[str]
+Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
 
 HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
@@ -45,7 +47,7 @@ def read_mat(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
 
     Returns
     -------
-    dict from name to ndarray or list of str
+    dict from name to ndarray, csc_array or list of str
         Char arrays give a text a row, cell arrays of chars a text a cell, without blanks at their ends.
 
     Raises
@@ -202,23 +204,22 @@ def _joined(real: npt.NDArray[Any], imaginary: npt.NDArray[Any] | None) -> npt.N
     return values
 
 
-def _sparse(head: _Head, body: _Bytes) -> npt.NDArray[Any]:
-    """Expand compressed columns, whose indices are checked."""
+def _sparse(head: _Head, body: _Bytes) -> csc_array:
+    """Take over compressed columns, whose indices are checked."""
     rows, columns = head.shape
-    _require_readable(head, rows * columns)
     row, start = body.numbers(), body.numbers().astype(np.int64)
     real = np.frombuffer(body.element()[1], "u1") if head.is_logical else body.numbers()  # logical: a false type
     stored = int(start[-1]) if start.size else -1
     values = _joined(real, body.numbers() if head.is_complex else None)[:stored]
     row = row[:stored].astype(np.int64)
     lengths = np.diff(start)
-    sound = start.size == columns + 1 and start[0] == 0 and (lengths >= 0).all()
+    sound = start.size == columns + 1 and start[0] == 0 and (lengths >= 0).all() and rows <= MOST_ROWS
     if not (sound and row.size == values.size == stored and ((row >= 0) & (row < rows)).all()):
         msg = f"the sparse matrix {head.name} has indices out of bounds"
         raise ValueError(msg)
-    full = np.zeros(head.shape, dtype=np.result_type(values.dtype, np.float64))
-    np.add.at(full, (row, np.repeat(np.arange(columns), lengths)), values)
-    return full
+    matrix = csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=(rows, columns))
+    matrix.sum_duplicates()
+    return matrix
 
 
 def _require_readable(head: _Head, entries: int) -> None:

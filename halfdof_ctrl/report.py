@@ -16,12 +16,13 @@ import control
 import matplotlib.pyplot as plt
 import numpy as np
 
+from halfdof_ctrl.containers import PathLike
 from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.descriptor import pencil_structure
 from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.eigentable import EigenvalueTable, eigenvalue_table
 from halfdof_ctrl.errors import FileFormatError, HalfdofError, WeightError
-from halfdof_ctrl.files import PathLike, naming_target, replacing, save_system
+from halfdof_ctrl.files import naming_target, replacing, save_system
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.page import MARK, Findings, PageFigure, page

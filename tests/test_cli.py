@@ -10,6 +10,7 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
+from fe_files import C, K, M, abaqus, matrix_market
 
 from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
 from halfdof_ctrl.cli import main
@@ -341,3 +342,33 @@ def test_the_command_runs_as_a_process_of_its_own(tmp_path: Path) -> None:
         process.stdout.close()
         assert process.stderr.read() == b""
     assert process.returncode == 141
+
+
+def test_info_looks_at_exported_files_first(capsys: pytest.CaptureFixture[str]) -> None:
+    """What was found in them, then the model; warnings on stderr."""
+    Path("job_STIF1.mtx").write_text(abaqus(K))
+    Path("job_MASS1.mtx").write_text(abaqus(M))
+    assert main(["info", "job_STIF1.mtx", "--outputs", "n1_u1"]) == 0
+    printed = capsys.readouterr()
+    assert printed.out.startswith("ImportReport: 3 DOFs, named by node and component")
+    assert "SecondOrderModel: 3 DOFs: 2 inertial, 0 half, 1 static" in printed.out
+    assert "halfdof-ctrl: warning: job_STIF1.mtx: no damping C in" in printed.err
+
+
+def test_info_takes_a_folder_and_no_time_for_large_pencils(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """QZ of thousands of DOFs takes hours."""
+    monkeypatch.setattr("halfdof_ctrl.cli.LARGEST_PENCIL", 2)
+    Path("exported").mkdir()
+    Path("exported/K.mtx").write_text(matrix_market(K))
+    assert main(["info", "exported"]) == 0
+    assert "Pencil and reduction: not shown above 2 DOFs." in capsys.readouterr().out
+
+
+def test_other_commands_take_exported_files(capsys: pytest.CaptureFixture[str]) -> None:
+    """Signals are selected by the names of nodes."""
+    for word, matrix in (("STIF", K), ("MASS", M), ("DMPV", C)):
+        Path(f"job_{word}1.mtx").write_text(abaqus(matrix))
+    assert main(["check", "job_STIF1.mtx", "--inputs", "F_n3_u1", "--outputs", "n1_u1,n3_u1"]) == 0
+    assert "Cross-check passed" in capsys.readouterr().out

@@ -2,6 +2,7 @@
 
 import inspect
 import pickle
+import re
 
 import pytest
 
@@ -15,6 +16,7 @@ from halfdof_ctrl.errors import (
     InconsistentStateError,
     LostDigitsWarning,
     MatrixError,
+    MissingExtraError,
     NearlyMasslessWarning,
     ParameterError,
     SignalNameError,
@@ -24,6 +26,7 @@ from halfdof_ctrl.errors import (
     UncertainRankError,
     WeightError,
     WorkerError,
+    naming_the_file,
 )
 
 EXAMPLES: list[HalfdofError] = [
@@ -38,7 +41,8 @@ EXAMPLES: list[HalfdofError] = [
     InconsistentStateError("contradicts", names=("a",), given=(1.0,), required=(2.0,)),
     WeightError("negative", names=("a",)),
     StabilizationError("unstable", eigenvalue=1 + 2j, quantity="a"),
-    FileFormatError("truncated", path="model.npz"),
+    FileFormatError("truncated", path="model.mtx", line=3),
+    MissingExtraError("needs h5py", path="model.mat", extra="hdf5"),
     WorkerError("cannot start", function="hydromount"),
 ]
 
@@ -70,3 +74,33 @@ def test_every_error_has_an_example_above() -> None:
 def test_warning_is_a_user_warning(kind: type[Warning]) -> None:
     """It can be filtered by its own type."""
     assert issubclass(kind, UserWarning)
+
+
+@pytest.mark.parametrize(
+    ("cause", "message", "line"),
+    [
+        (FileFormatError("cut short", path="", line=3), "a.mtx, line 3: cut short", 3),
+        (MatrixError("K is empty", matrix="K"), "a.mtx: K is empty", None),
+        (
+            KeyError("x"),
+            "a.mtx: the file is damaged or of another kind than its ending says ('x'). Write it anew.",
+            None,
+        ),
+        (ValueError(), "a.mtx: the file is damaged or of another kind than its ending says (ValueError)", None),
+    ],
+)
+def test_whatever_a_reader_raises_becomes_one_refusal_that_names_the_file(
+    cause: Exception, message: str, line: int | None
+) -> None:
+    """With the line, and the cause kept."""
+    with pytest.raises(FileFormatError, match=re.escape(message)) as caught, naming_the_file("a.mtx"):
+        raise cause
+    assert (caught.value.path, caught.value.line, caught.value.__cause__) == ("a.mtx", line, cause)
+
+
+def test_a_missing_extra_stays_one_and_an_os_error_too() -> None:
+    """Neither is a fault of the file."""
+    with pytest.raises(MissingExtraError, match=r"a\.mat: needs h5py"), naming_the_file("a.mat"):
+        raise MissingExtraError("needs h5py", path="", extra="hdf5")
+    with pytest.raises(FileNotFoundError), naming_the_file("a.mat"):
+        raise FileNotFoundError
