@@ -45,7 +45,7 @@ CHARACTERISTIC = 1e-8  # det(sI - A), relative
 EIGENVALUE = 1e-8  # to the power of the multiplicity, relative to the size of A
 UNITS = 1e-8  # answers in other units, relative to the largest entry at each frequency
 
-POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 ROLL_OFF: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s]
 
 DEFAULT = settings().max_examples

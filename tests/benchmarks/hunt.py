@@ -34,7 +34,7 @@ import halfdof_ctrl as hd
 from halfdof_ctrl.errors import ImproperError, SingularPencilError
 from halfdof_ctrl.model import LETTERS
 
-POINTS = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+POINTS = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
 ANNOUNCED = 1e5  #: times the limits may be lost where LostDigitsWarning says so
 LIMITS = {
