@@ -1,4 +1,4 @@
-"""Checked, read-only matrices: the one place where shapes and entries are tested."""
+"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparsearrays`)."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -6,6 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import issparse
 
 from halfdof_ctrl.errors import MatrixError
 
@@ -14,6 +15,7 @@ ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
 
 DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
+LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense for what works on dense matrices alone
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
 PLAIN = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
@@ -46,23 +48,30 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
     array = _numbers(value, letter)
     if shape is not None and array.ndim == 1:
         array = _as_row_or_column(array, shape)
-    if array.ndim != MATRIX_DIMENSIONS or (
-        array.shape != shape if shape is not None else array.shape[0] != array.shape[1]
-    ):
-        expected = "square" if shape is None else f"{shape[0]} x {shape[1]}"
-        found = " x ".join(map(str, array.shape)) or "a single number"
-        msg = (
-            f"{letter} must be {expected}, but it is {found}. Check its rows and columns against the DOFs and signals."
-        )
-        raise MatrixError(msg, matrix=letter)
-    if array.size == 0:
-        msg = f"{letter} is empty: a model needs at least one DOF, one input and one output."
-        raise MatrixError(msg, matrix=letter)
+    require_shape(array.shape, letter, shape)
     if not np.logical_and.reduce(np.isfinite(array), axis=None):
         row, column = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
         msg = f"{letter}[{row}, {column}] is {array[row, column]}: every entry must be a finite number."
         raise MatrixError(msg, matrix=letter)
     return read_only(array)
+
+
+def require_shape(found: tuple[int, ...], letter: str, shape: tuple[int, int] | None) -> None:
+    """Refuse a matrix that is not square, or not of the given shape, or empty.
+
+    Raises
+    ------
+    MatrixError
+        It is one of these.
+    """
+    if len(found) != MATRIX_DIMENSIONS or (found != shape if shape is not None else found[0] != found[1]):
+        expected = "square" if shape is None else f"{shape[0]} x {shape[1]}"
+        size = " x ".join(map(str, found)) or "a single number"
+        msg = f"{letter} must be {expected}, but it is {size}. Check its rows and columns against the DOFs and signals."
+        raise MatrixError(msg, matrix=letter)
+    if 0 in found:
+        msg = f"{letter} is empty: a model needs at least one DOF, one input and one output."
+        raise MatrixError(msg, matrix=letter)
 
 
 def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matrix]:
@@ -110,7 +119,9 @@ def is_complex(matrix: Matrix) -> bool:
 
 
 def is_zero(matrix: Matrix) -> bool:
-    """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares."""
+    """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
+    if issparse(matrix):
+        return bool(matrix.size == 0)  # of stored entries, none of which is zero
     shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)
     return shared or not matrix.any()
 

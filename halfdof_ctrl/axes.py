@@ -17,7 +17,15 @@ from matplotlib.lines import Line2D
 
 from halfdof_ctrl.errors import ParameterError
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.names import force_names, motion_names, name_from_label, reaction_names, unknown_name_error
+from halfdof_ctrl.names import (
+    MOST_CACHED,
+    force_names,
+    motion_names,
+    name_from_label,
+    physical_places,
+    reaction_names,
+    unknown_name_error,
+)
 
 AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
 AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
@@ -203,6 +211,8 @@ def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> 
     if isinstance(system, SecondOrderModel):
         names: set[str] = {*system.inputs, *system.outputs}
         dofs = tuple(dict.fromkeys((*system.dofs, *system.prescribed)))
+        if len(dofs) > MOST_CACHED:
+            dofs = _concerned({*names, *given}, dofs)
         for dof, *motions, force in zip(
             dofs, *(motion_names(dofs, k) for k in range(3)), force_names(dofs), strict=True
         ):
@@ -217,6 +227,12 @@ def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> 
         if name not in names and name not in known:
             raise unknown_name_error(name, "signal", sorted(names | set(known)))
     return {name: unit for name, unit in (known | given).items() if unit}
+
+
+def _concerned(names: set[str], dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Give the DOFs that some of the names are forces on or motions of."""
+    places = {place % len(dofs) for place in physical_places(names, dofs, "output").values()}
+    return tuple([dofs[place] for place in sorted(places.union(physical_places(names, dofs, "input").values()))])
 
 
 def signal_names(system: control.StateSpace | SecondOrderModel) -> tuple[list[str], list[str]]:

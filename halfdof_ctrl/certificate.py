@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.offsets import IndexArray
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import StateEquations
 from halfdof_ctrl.spectrum import balanced_states
@@ -22,9 +21,8 @@ NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time s
 BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
 DRIFT = 0.1  #: change of the logarithm of the ratio in (19) that rounding may make
 SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
-SHARE = 1e-8  #: entries of null vectors above this are not rounding
 AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
-RESOLVED = 1e-6  #: P(s) with singular values below this part of the largest says nothing about lost digits
+DOUBT = 4 * float(np.finfo(float).eps)  #: times n and the condition of P(s): differences that a direct solve may make
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,22 +51,6 @@ class ScaledPencil:
         """Whether P(s) is singular to working precision at all points."""
         return all(self._smallest(s) <= SINGULAR * self.P.shape[1] for s in NEAR)
 
-    def null_spaces(self) -> tuple[IndexArray, IndexArray]:
-        """Give the equations that are dependent and the unknowns that can move freely, at a generic point.
-
-        A left null vector combines the one, a right one moves the other, and another basis of the null spaces
-        has the same entries that are not zero.
-        """
-        (
-            left,
-            values,
-            right,
-        ) = np.linalg.svd(self._scaled(NEAR[0]))
-        null = values <= SINGULAR * values.size * max(float(values[0]), 1.0)
-        shares = np.abs(left[:, null]).max(axis=1, initial=0.0), np.abs(right[null]).max(axis=0, initial=0.0)
-        equations, unknowns = (np.flatnonzero(share > SHARE) for share in shares)
-        return equations, unknowns
-
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""
         fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
@@ -90,19 +72,22 @@ class ScaledPencil:
         size, error, worst = np.zeros(m), np.zeros(m), 0.0
         for s in AXIS:
             P, B = self.at(s)
+            rows, columns = (factors[:, None] for factors in equilibrating_factors(np.abs(P), even=2.0))
+            matrix = P * rows * columns.T
             try:
-                direct = np.linalg.solve(P, B)
+                direct = columns * np.linalg.solve(matrix, rows * B)
+                found = X @ np.linalg.solve(s * np.eye(N) - A, into + 0j)
             except np.linalg.LinAlgError:  # an eigenvalue
                 continue
-            smallest = self._smallest(s)
-            found = X @ np.linalg.solve(s * np.eye(N) - A, into.astype(complex))
             for power, part in enumerate(equations.displacement.U):
                 found = found + s**power * part
             size = np.maximum(size, np.abs(direct).max(axis=0, initial=0.0))
             error = np.maximum(error, np.abs(found - direct).max(axis=0, initial=0.0))
             F, output = _at(self.F, s), _at(self.F, s) @ direct + _at(self.D, s)
-            if smallest > RESOLVED and output.any():
-                worst = max(worst, float(np.abs(F @ (found - direct)).max() / np.abs(output).max()))
+            lost = float(np.abs(F @ (found - direct)).max())
+            doubt = float((np.abs(F) @ columns).max() * (np.abs(direct) / columns).max()) * np.linalg.cond(matrix)
+            if output.any() and lost > DOUBT * len(matrix) * doubt:
+                worst = max(worst, lost / float(np.abs(output).max()))
         return Losses(size, error, worst)
 
     def _scaled(self, s: complex) -> ComplexArray:

@@ -46,6 +46,7 @@ from halfdof_ctrl.reduction import exact_reduction
 from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
 from halfdof_ctrl.response import DEFAULT_POINTS, default_frequencies, frequency_response
 from halfdof_ctrl.statespace import mech2ss
+from halfdof_ctrl.stepplot import MOST_RECOVERED
 from halfdof_ctrl.stiffness import dynamic_stiffness_response, motion_frequencies
 from halfdof_ctrl.stiffnessplot import Scale
 
@@ -293,6 +294,8 @@ def _frequencies(
 
 def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
     """Add the displacements of DOFs without inertia to the outputs, as the figure shows them."""
+    if model.is_sparse and len(model.dofs) > MOST_RECOVERED:
+        return model
     part = exact_reduction(model).partition
     known = motions(model.dofs)
     extra = [name for name in (*part.half, *part.static) if name in known and name not in model.outputs]

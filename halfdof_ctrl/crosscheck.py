@@ -20,6 +20,7 @@ import scipy.linalg
 import scipy.optimize
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, powers_of_two
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.descriptor import pencil_structure, require_regular, typical_frequency
 from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.model import SecondOrderModel
@@ -133,6 +134,11 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     """
     if model.is_complex:
         raise complex_model_error(model)
+    model = dense_copy(
+        model,
+        "crosscheck",
+        "Compare descriptor_response(model, omega) with frequency_response(mech2ss(model), omega) instead.",
+    )
     if (sys.noutputs, sys.ninputs) != model.D.shape:
         msg = (
             f"The system has {sys.noutputs} outputs and {sys.ninputs} inputs, the model {len(model.outputs)} and "

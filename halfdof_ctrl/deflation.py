@@ -99,12 +99,13 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
 def in_model_units(realization: Realization, units: Units) -> StateEquations:
     """Undo the scaling by powers of two, exactly."""
     equations, place = realization.equations, np.array(realization.states, dtype=np.intp).reshape(-1, 2)
-    states = units.columns[place[:, 0]] * units.time ** place[:, 1].astype(float)  # x = states x~
+    states = units.by_time(units.columns[place[:, 0]], place[:, 1])  # x = states x~
+    down = states[:, None] / units.inputs
     return StateEquations(
-        A=read_only(equations.A * states[:, None] / states * units.time),
-        B=read_only(equations.B * states[:, None] * units.time),
+        A=read_only(equations.A * (states[:, None] / states) * units.time),
+        B=read_only(equations.B * down * units.time),
         displacement=_rescaled(equations.displacement, states, units),
-        shift=tuple([part * states[:, None] * units.time**-k for k, part in enumerate(equations.shift)]),
+        shift=tuple([units.by_time(part * down, -k) for k, part in enumerate(equations.shift)]),
     )
 
 
@@ -229,7 +230,10 @@ def _levels(offsets: Offsets) -> int:
 def _rescaled(signal: Signal, states: FloatArray, units: Units) -> Signal:
     """Bring displacements to the model's units; derivatives of u are by the model's time."""
     rows = units.columns[:, None]
-    return Signal(signal.X * rows / states, tuple([part * rows * units.time**-k for k, part in enumerate(signal.U)]))
+    return Signal(
+        signal.X * (rows / states),
+        tuple([units.by_time(part * (rows / units.inputs), -k) for k, part in enumerate(signal.U)]),
+    )
 
 
 def _column_parts(values: FloatArray, first: int, width: int) -> list[FloatArray]:

@@ -5,21 +5,23 @@ does not, or where a pencil is called singular whose P(s) is not, the decisions 
 caution about rounding errors. If none passes, the model is refused.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from halfdof_ctrl.arrays import FloatArray
-from halfdof_ctrl.certificate import ScaledPencil
+from halfdof_ctrl.certificate import NEAR, ScaledPencil
 from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
+from halfdof_ctrl.nullspaces import causes, null_spaces
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
+from halfdof_ctrl.refusals import singular_pencil_error
 from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
-from halfdof_ctrl.signals import Rounding, StateEquations
+from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
@@ -62,9 +64,14 @@ class StateSelection:
         """DOFs without a state: they follow from the others and the inputs."""
         return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
 
-    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
         """Tell for each of the model's DOFs with less than two states whether it is half or static."""
         return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
+
+    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Give the states that belong to displacements and velocities of all n DOFs; higher derivatives are zero."""
+        from_q, from_v = self.state_maps()[:2]
+        return np.asarray(from_q @ displacements + from_v @ velocities)
 
     def state_maps(self) -> tuple[FloatArray, ...]:
         """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""
@@ -86,13 +93,40 @@ class Deflated:
     rounding: Rounding
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
     loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
+    certified: bool  #: whether (19) holds, as it need not where `tol` was given
 
 
 def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
     """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    system, units = _scaled(model)
-    pencil = _scaled_pencil(model, system, units)
+    _, units, pencil = _scaled(model)
     return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
+
+
+def loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Measure what state equations, from whatever road, lose against direct solves."""
+    _, units, pencil = _scaled(model)
+    q, across = equations.displacement, units.inputs / units.columns[:, None]
+    scaled = StateEquations(
+        A=np.asarray(equations.A / units.time),
+        B=equations.B * units.inputs / units.time,
+        displacement=Signal(
+            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
+        ),
+        shift=(),
+    )
+    return pencil.losses(scaled).worst
+
+
+def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
+    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    powers = np.arange(3)[:, None, None]
+    pencil = ScaledPencil(
+        P=system.matrix,
+        B=system.coefficients[:, :, system.size :],
+        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
+        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+    )
+    return system, units, pencil
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
@@ -104,7 +138,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
         A real model.
     tol : float, optional
         Singular values of a scaled block at most `tol` times its largest count as zero; by default what rounding
-        makes. With it the result is not certified, since it belongs to another model.
+        makes. With it the result need not pass (19), since it belongs to another model.
 
     Raises
     ------
@@ -113,8 +147,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    system, units = _scaled(model)
-    pencil = _scaled_pencil(model, system, units)
+    system, units, pencil = _scaled(model)
     decisions: tuple[BlockDecision, ...] = ()
     for caution in CAUTIONS:
         relaxation = relaxed(system, caution, tol)
@@ -124,23 +157,11 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
                 raise _singular_error(model, pencil)
             continue
         result = realized(relaxation.system, relaxation.offsets, caution)
-        if tol is not None or pencil.has_spectrum(result.equations.A):
-            return _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-    raise _uncertain_error(model, decisions)
-
-
-def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units]:
-    return scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-
-
-def _scaled_pencil(model: SecondOrderModel, system: RowSystem, units: Units) -> ScaledPencil:
-    speed = (units.time ** np.arange(3.0))[:, None, None]
-    return ScaledPencil(
-        P=system.matrix,
-        B=system.coefficients[:, :, system.size :],
-        F=np.stack([model.F, model.G, model.H]) * units.columns * speed,
-        D=np.stack([model.D, model.Dv, model.Da]) * speed,
-    )
+        certified = pencil.has_spectrum(result.equations.A)
+        if certified or tol is not None:
+            found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
+            return replace(found, certified=certified)
+    raise _uncertain_error(model, decisions, tol)
 
 
 def _in_model_units(
@@ -166,6 +187,7 @@ def _in_model_units(
         rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
         rcond=result.rcond,
         loss=losses.worst,
+        certified=True,
     )
 
 
@@ -184,22 +206,26 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 
 
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
-    equations, unknowns = (_names(model, places) for places in pencil.null_spaces())
-    msg = (
-        f"The pencil is singular: det P(s) vanishes at every s. DOFs {listed(unknowns)} can move in any way without a "
-        f"force, and the equations of {listed(equations)} depend on each other."
+    null = null_spaces(pencil.at(NEAR[0])[0])
+    return singular_pencil_error(
+        dofs=_names(model, np.array(sorted(frozenset().union(*null.unknowns)), dtype=np.intp)),
+        equations=_names(model, np.array(sorted(frozenset().union(*null.equations)), dtype=np.intp)),
+        fact="to working precision",
+        causes=causes(null, (model.K, model.C, model.M), model.dofs),
     )
-    return SingularPencilError(msg, dofs=unknowns)
 
 
-def _uncertain_error(model: SecondOrderModel, decisions: tuple[BlockDecision, ...]) -> UncertainRankError:
+def _uncertain_error(
+    model: SecondOrderModel, decisions: tuple[BlockDecision, ...], tol: float | None
+) -> UncertainRankError:
     closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
+    rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
     msg = (
-        "No decision about ranks gives state equations with the spectrum of P(s): the model is singular or of another "
-        f"order to working precision. The closest decision is about DOFs {listed(dofs)} (singular values "
-        f"{gap:.1e} apart). Check their masses, dampers, springs and constraints for entries that nearly cancel, or "
-        "pass tol to say which count as zero."
+        f"No decision about ranks gives state equations with the spectrum of P(s): to working precision {rest}. The "
+        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, "
+        "dampers, springs and constraints for entries that nearly cancel, or pass "
+        f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)

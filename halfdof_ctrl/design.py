@@ -24,10 +24,12 @@ import scipy.linalg
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.cost import Cost, Weights, given_cost, physical_cost
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.errors import StabilizationError, WeightError
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import force_names, listed, motion_names
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
+from halfdof_ctrl.sparsepartition import SparsePartition
 from halfdof_ctrl.spectrum import balanced, balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.statespace import labelled_system, mech2ss
 
@@ -66,17 +68,19 @@ class StateFeedback:
         Raises
         ------
         WeightError
-            Derivatives of the inputs act on the model (`Bv`, `Ba`), so that the state is not a function of
-            q and q' alone.
+            Derivatives of the inputs act on the model (by `Bv`, `Ba` or a constraint), so that the state is not a
+            function of q and its derivatives alone; or a state is a third or higher derivative of a DOF.
         """
         if self.reduction.shift:
             msg = (
-                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (Bv, "
-                "Ba): the closed loop is no second-order model of the same form. Use `closed_loop`."
+                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (by "
+                "Bv, Ba or a constraint): the closed loop is no second-order model of the same form. Use `closed_loop`."
             )
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K
-        gains = [K @ state_map for state_map in self.reduction.partition.state_maps()]  # on q, q' and, rarely, q''
+        partition = self.reduction.partition
+        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
         if len(gains) > DERIVATIVES:
             msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
             raise WeightError(msg, names=self.states)
@@ -164,6 +168,7 @@ def lqr(
     [[1.0, 1.414214]]
     """
     physical = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+    model = dense_copy(model, "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R).")
     reduction = exact_reduction(model)
     if reduction.order == 0:
         msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."

@@ -72,11 +72,16 @@ class SingularLeadingMatrixError(HalfdofError):
 
 
 class SingularPencilError(HalfdofError):
-    """``det P(s)`` vanishes identically: `dofs` can move in any way without a force."""
+    """``det P(s)`` vanishes identically.
 
-    def __init__(self, message: str, *, dofs: tuple[str, ...]) -> None:
+    `dofs` can move in any way without a force, and `equations` depend on each other. An equation is named by the DOF
+    whose row of M, C, K it is: the equation of motion of a displacement, the constraint of a multiplier.
+    """
+
+    def __init__(self, message: str, *, dofs: tuple[str, ...], equations: tuple[str, ...] = ()) -> None:
         super().__init__(message)
         self.dofs = dofs
+        self.equations = equations
 
 
 class UncertainRankError(HalfdofError):
@@ -133,6 +138,15 @@ class StabilizationError(HalfdofError):
         super().__init__(message)
         self.eigenvalue = eigenvalue
         self.quantity = quantity
+
+
+class ModelSizeError(HalfdofError):
+    """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
+
+    def __init__(self, message: str, *, size: int, limit: int) -> None:
+        super().__init__(message)
+        self.size = size
+        self.limit = limit
 
 
 class FileFormatError(HalfdofError):

@@ -27,7 +27,7 @@ import numpy as np
 import scipy.io
 from scipy.sparse import issparse
 
-from halfdof_ctrl.arrays import checked_matrix
+from halfdof_ctrl.arrays import checked_matrix, is_zero
 from halfdof_ctrl.containers import (
     MATRIX_ENDINGS,
     Content,
@@ -83,7 +83,7 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     ...     load_model(f"{folder}/mount.npz").outputs
     ('y', 'y1', 'y2')
     """
-    kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or getattr(model, letter).any()]
+    kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or not is_zero(getattr(model, letter))]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
     names = {key: getattr(model, key) for key in MODEL_NAMES}

@@ -11,12 +11,13 @@ it has checked is not checked again. Derivation of all that follows: docs/explan
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.arrays import (
+    DENSE_ROW_LIMIT,
     MATRIX_DIMENSIONS,
     ComplexArray,
     Matrix,
@@ -24,21 +25,36 @@ from halfdof_ctrl.arrays import (
     checked_square_matrices,
     is_complex,
     read_only,
-    unit_matrix,
-    zero_matrix,
 )
+from halfdof_ctrl.errors import ModelSizeError
 from halfdof_ctrl.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
 from halfdof_ctrl.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 from halfdof_ctrl.names import (
+    DERIVATIVE_SUFFIXES,
+    FORCE_PREFIX,
     Names,
     as_tuple,
     checked_dofs,
     force_names,
     listed,
-    motion_names,
-    motions,
     picked_places,
     reconciled_names,
+)
+from halfdof_ctrl.sparsearrays import (
+    MatrixLike,
+    as_sparse,
+    checked_sparse_matrix,
+    checked_sparse_squares,
+    filled_rows,
+    has_sparse,
+    is_sparse,
+    locked,
+    picked_below,
+    picked_beside,
+    transposed,
+    unit_columns,
+    unit_like,
+    zeros_like,
 )
 
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
@@ -53,7 +69,7 @@ class SecondOrderModel:
     are those of the user; with SI units and forces as inputs they read as given here.
     """
 
-    M: Matrix  #: (n, n) mass [kg]
+    M: Matrix  #: (n, n) mass [kg]; all matrices are `scipy.sparse.csc_array` in a sparse model (`is_sparse`)
     C: Matrix  #: (n, n) damping [N s/m]
     K: Matrix  #: (n, n) stiffness [N/m]
     B: Matrix  #: (n, m) what an input does to the equations [N per unit of input]
@@ -75,6 +91,11 @@ class SecondOrderModel:
     def is_complex(self) -> bool:
         """Whether any matrix has imaginary parts (structural damping)."""
         return any([is_complex(matrix) for matrix in self._matrices()])  # noqa: C419  # a list is faster here
+
+    @property
+    def is_sparse(self) -> bool:
+        """Whether the matrices are sparse, all of them, since one of M, C, K was given so to `mechss`."""
+        return is_sparse(self.K)
 
     @property
     def complex_matrices(self) -> tuple[str, ...]:
@@ -173,7 +194,7 @@ class SecondOrderModel:
         base = self.select(new.old_inputs or self.inputs[:1], new.old_outputs or self.outputs[:1])
         P, B, F, D = with_motion_as_input(*_coefficients(base), new.driven, new.derivative)
         letters = ("K", "C", "M", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
-        matrices: dict[str, Any] = dict(zip(letters, map(read_only, (*P, *B, *F, *D)), strict=True))
+        matrices: dict[str, Any] = dict(zip(letters, map(locked, (*P, *B, *F, *D)), strict=True))
         model = replace(
             base,
             **matrices,
@@ -183,6 +204,27 @@ class SecondOrderModel:
             prescribed=(*self.prescribed, *new.names),
         )
         return model.select(new.inputs, new.outputs)
+
+    def as_dense(self) -> "SecondOrderModel":
+        """Give the model with dense matrices: itself if they are.
+
+        Raises
+        ------
+        ModelSizeError
+            A matrix would have more than 5000 x 5000 entries.
+        """
+        if not self.is_sparse:
+            return self
+        n, m, p = (len(names) for names in (self.dofs, self.inputs, self.outputs))
+        largest = max(n, m, p)
+        if largest > DENSE_ROW_LIMIT:
+            msg = (
+                f"Dense matrices of {n} DOFs, {m} inputs and {p} outputs would take up to {8e-9 * largest**2:.3g} GB "
+                f"each; the limit is {DENSE_ROW_LIMIT} of each. Select fewer signals, or stay with the sparse model."
+            )
+            raise ModelSizeError(msg, size=largest, limit=DENSE_ROW_LIMIT)
+        dense: dict[str, Any] = {letter: read_only(as_sparse(getattr(self, letter)).toarray()) for letter in LETTERS}
+        return replace(self, **dense)
 
     def __repr__(self) -> str:
         """Give the model on four lines: what it is called, how its DOFs split, its signals."""
@@ -198,19 +240,19 @@ class SecondOrderModel:
 
 
 def mechss(
-    M: npt.ArrayLike | None,
-    C: npt.ArrayLike | None,
-    K: npt.ArrayLike | None,
-    B: npt.ArrayLike | None = None,
-    F: npt.ArrayLike | None = None,
-    G: npt.ArrayLike | None = None,
+    M: MatrixLike | None,
+    C: MatrixLike | None,
+    K: MatrixLike | None,
+    B: MatrixLike | None = None,
+    F: MatrixLike | None = None,
+    G: MatrixLike | None = None,
     *,
-    H: npt.ArrayLike | None = None,
-    D: npt.ArrayLike | None = None,
-    Bv: npt.ArrayLike | None = None,
-    Ba: npt.ArrayLike | None = None,
-    Dv: npt.ArrayLike | None = None,
-    Da: npt.ArrayLike | None = None,
+    H: MatrixLike | None = None,
+    D: MatrixLike | None = None,
+    Bv: MatrixLike | None = None,
+    Ba: MatrixLike | None = None,
+    Dv: MatrixLike | None = None,
+    Da: MatrixLike | None = None,
     dofs: Names = None,
     inputs: Names = None,
     outputs: Names = None,
@@ -220,10 +262,11 @@ def mechss(
 
     Parameters
     ----------
-    M, C, K : (n, n) array_like or None
+    M, C, K : (n, n) array_like, scipy sparse array or matrix, or None
         Mass [kg], damping [N s/m] and stiffness [N/m]; None for a matrix of zeros, but not all three.
-        They may be singular, unsymmetric or complex (structural damping).
-    B : (n, m) array_like, optional
+        They may be singular, unsymmetric or complex (structural damping). If one of them is sparse, the model is: all
+        its matrices are kept in compressed columns, and nothing of n x n entries is ever formed.
+    B : (n, m) array_like or sparse, optional
         Forces per input [N]; by default a unit force on every DOF, named ``F_<dof>``. A 1D array of
         length n is one input.
     F, G, H : (p, n) array_like, optional
@@ -264,24 +307,24 @@ def mechss(
       inputs:  F_mass, F_joint
       outputs: mass, joint
     """
-    M, C, K = checked_square_matrices((M, C, K), "MCK")
-    n = len(M)
+    M, C, K = (checked_sparse_squares if has_sparse((M, C, K)) else checked_square_matrices)((M, C, K), "MCK")
+    n = M.shape[0]
     names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
     m = _signals((B, Bv, Ba), axis=1, default=n)
     p = _signals((F, G, H), axis=0, default=n)
     every_force = B is None and Bv is None and Ba is None
     every_displacement = F is None and G is None and H is None
     input_columns = (
-        unit_matrix(n) if every_force else _checked_or_zero(B, "B", n, m),
-        _checked_or_zero(Bv, "Bv", n, m),
-        _checked_or_zero(Ba, "Ba", n, m),
+        unit_like(K, n) if every_force else _checked_or_zero(B, "B", n, m, K),
+        _checked_or_zero(Bv, "Bv", n, m, K),
+        _checked_or_zero(Ba, "Ba", n, m, K),
     )
     output_rows = (
-        unit_matrix(n) if every_displacement else _checked_or_zero(F, "F", p, n),
-        _checked_or_zero(G, "G", p, n),
-        _checked_or_zero(H, "H", p, n),
+        unit_like(K, n) if every_displacement else _checked_or_zero(F, "F", p, n, K),
+        _checked_or_zero(G, "G", p, n, K),
+        _checked_or_zero(H, "H", p, n, K),
     )
-    direct = (_checked_or_zero(D, "D", p, m), _checked_or_zero(Dv, "Dv", p, m), _checked_or_zero(Da, "Da", p, m))
+    direct = tuple([_checked_or_zero(X, name, p, m, K) for X, name in ((D, "D"), (Dv, "Dv"), (Da, "Da"))])
     plain_inputs = every_force and inputs is None
     plain_outputs = every_displacement and outputs is None and D is None and Dv is None and Da is None
     return SecondOrderModel(
@@ -306,44 +349,54 @@ def mechss(
 
 def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Tell which columns of M are not null, and which of the others have a column in C that is not."""
-    inertial = np.asarray(np.logical_or.reduce(M, axis=0))
-    return inertial, np.asarray(np.logical_or.reduce(C, axis=0) > inertial)
+    if is_sparse(M):
+        inertial, damped = (np.diff(as_sparse(X).indptr) > 0 for X in (M, C))
+    else:
+        inertial, damped = (np.logical_or.reduce(X, axis=0) for X in (M, C))
+    return np.asarray(inertial), np.asarray(damped > inertial)
 
 
-def _signals(given: Sequence[npt.ArrayLike | None], axis: int, default: int) -> int:
+def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int:
     """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
     for value in given:
         if value is not None:
-            shape = np.shape(value)
+            shape = np.shape(cast("npt.ArrayLike", value))
             return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
     return default
 
 
-def _checked_or_zero(value: object, letter: str, rows: int, columns: int) -> Matrix:
+def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: Matrix) -> Matrix:
+    """Check one matrix, dense or sparse as `like` is."""
     if value is None or (type(value) in {int, float} and value == 0):
-        return zero_matrix(rows, columns)
-    return checked_matrix(value, letter, (rows, columns))
+        return zeros_like(like, rows, columns)
+    return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
 
 
 def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...]) -> tuple[str, ...]:
     """Name the inputs; a column that is a unit force on a DOF and the name ``F_<dof>`` belong together."""
-    forces = force_names(dofs)
-    meaning = [_unit_vectors([matrix[:, j] for matrix in columns]) for j in range(columns[0].shape[1])]
-    found = [forces[hit[1]] if hit is not None and hit[0] == 0 else None for hit in meaning]
-    return reconciled_names(given, found, forces, ("inputs", "u", "the unit force on a DOF", "B"))
+    if is_sparse(columns[0]):
+        meaning = unit_columns(columns)
+    else:
+        meaning = [_unit_vectors([matrix[:, j] for matrix in columns]) for j in range(columns[0].shape[1])]
+    found = [FORCE_PREFIX + dofs[hit[1]] if hit is not None and hit[0] == 0 else None for hit in meaning]
+    return reconciled_names(given, found, dofs, "input")
 
 
 def _output_names(
     given: Names, rows: Sequence[Matrix], direct: Sequence[Matrix], dofs: tuple[str, ...]
 ) -> tuple[str, ...]:
     """Name the outputs; a row that is a DOF's motion and the motion's name belong together."""
-    names = [motion_names(dofs, derivative) for derivative in range(len(rows))]
-    found: list[str | None] = []
-    for i in range(rows[0].shape[0]):
-        hit = _unit_vectors([matrix[i] for matrix in rows])
-        fed = any(matrix[i].any() for matrix in direct)
-        found.append(None if hit is None or fed else names[hit[0]][hit[1]])
-    return reconciled_names(given, found, tuple(motions(dofs)), ("outputs", "y", "a DOF's motion", "F, G, H"))
+    if is_sparse(rows[0]):
+        meaning, fed = unit_columns([transposed(matrix) for matrix in rows]), filled_rows(direct)
+    else:
+        every = range(rows[0].shape[0])
+        meaning = [_unit_vectors([matrix[i] for matrix in rows]) for i in every]
+        fed = [any(matrix[i].any() for matrix in direct) for i in every]
+    found = [
+        None if hit is None or is_fed else dofs[hit[1]] + DERIVATIVE_SUFFIXES[hit[0]]
+        for hit, is_fed in zip(meaning, fed, strict=True)
+    ]
+    return reconciled_names(given, found, dofs, "output")
 
 
 def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
@@ -362,33 +415,34 @@ def _coefficients(model: SecondOrderModel) -> tuple[Coefficients, Coefficients, 
 
 def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
     require_free(names, model.inputs, model.prescribed)
-    picked = picked_places(names, model.inputs, force_names(model.dofs), "input")
-    unit, no_force, no_feed = unit_matrix(model.M.shape[0]), zero_matrix(*model.M.shape), zero_matrix(*model.F.shape)
+    picked = picked_places(names, model.inputs, model.dofs, "input")
+    n, p = model.M.shape[0], model.F.shape[0]
+    unit, no_force, no_feed = unit_like(model.K, n), zeros_like(model.K, n, n), zeros_like(model.K, p, n)
     return replace(
         model,
         inputs=as_tuple(names),
-        B=read_only(np.hstack([model.B, unit])[:, picked]),
-        Bv=read_only(np.hstack([model.Bv, no_force])[:, picked]),
-        Ba=read_only(np.hstack([model.Ba, no_force])[:, picked]),
-        D=read_only(np.hstack([model.D, no_feed])[:, picked]),
-        Dv=read_only(np.hstack([model.Dv, no_feed])[:, picked]),
-        Da=read_only(np.hstack([model.Da, no_feed])[:, picked]),
+        B=picked_beside([model.B, unit], picked),
+        Bv=picked_beside([model.Bv, no_force], picked),
+        Ba=picked_beside([model.Ba, no_force], picked),
+        D=picked_beside([model.D, no_feed], picked),
+        Dv=picked_beside([model.Dv, no_feed], picked),
+        Da=picked_beside([model.Da, no_feed], picked),
     )
 
 
 def _with_outputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
-    picked = picked_places(names, model.outputs, tuple(motions(model.dofs)), "output")
+    picked = picked_places(names, model.outputs, model.dofs, "output")
     n, m = model.M.shape[0], model.B.shape[1]
-    unit, no_motion, no_feed = unit_matrix(n), zero_matrix(n, n), zero_matrix(3 * n, m)
+    unit, no_motion, no_feed = unit_like(model.K, n), zeros_like(model.K, n, n), zeros_like(model.K, 3 * n, m)
     return replace(
         model,
         outputs=as_tuple(names),
-        F=read_only(np.vstack([model.F, unit, no_motion, no_motion])[picked]),
-        G=read_only(np.vstack([model.G, no_motion, unit, no_motion])[picked]),
-        H=read_only(np.vstack([model.H, no_motion, no_motion, unit])[picked]),
-        D=read_only(np.vstack([model.D, no_feed])[picked]),
-        Dv=read_only(np.vstack([model.Dv, no_feed])[picked]),
-        Da=read_only(np.vstack([model.Da, no_feed])[picked]),
+        F=picked_below([model.F, unit, no_motion, no_motion], picked),
+        G=picked_below([model.G, no_motion, unit, no_motion], picked),
+        H=picked_below([model.H, no_motion, no_motion, unit], picked),
+        D=picked_below([model.D, no_feed], picked),
+        Dv=picked_below([model.Dv, no_feed], picked),
+        Da=picked_below([model.Da, no_feed], picked),
     )
 
 
@@ -397,8 +451,10 @@ def _split_in_words(M: Matrix, C: Matrix, K: Matrix) -> str:
     inertial, half = null_column_kinds(M, C)
     n, n_inertial, n_half = M.shape[0], int(inertial.sum()), int(half.sum())
     kinds = f"{n_inertial} inertial, {n_half} half, {n - n_inertial - n_half} static"
-    leading = np.where(inertial, M, np.where(half, C, K))
-    size = np.abs(leading).max(axis=0)
-    if n <= LARGEST_RANKED_REPR and (not size.all() or np.linalg.matrix_rank(leading / size) < n):
-        return f"{kinds} by null columns, which do not suffice here (see exact_reduction)"
+    if n <= LARGEST_RANKED_REPR:
+        M, C, K = (as_sparse(X).toarray() if is_sparse(X) else X for X in (M, C, K))
+        leading = np.where(inertial, M, np.where(half, C, K))
+        size = np.abs(leading).max(axis=0)
+        if not size.all() or np.linalg.matrix_rank(leading / size) < n:
+            return f"{kinds} by null columns, which do not suffice here (see exact_reduction)"
     return f"{kinds}; {2 * n_inertial + n_half} states"

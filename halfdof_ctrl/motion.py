@@ -32,10 +32,11 @@ from halfdof_ctrl.names import (
     force_names,
     listed,
     motion_names,
-    motions,
+    physical_places,
     reaction_names,
     unknown_name_error,
 )
+from halfdof_ctrl.sparsearrays import has_sparse, joined_sparse
 
 MotionKind: TypeAlias = Literal["displacement", "velocity", "acceleration"]
 
@@ -107,10 +108,11 @@ def prescribed_signals(model: Named, dof: Names, kind: MotionKind, inputs: Names
             "one. Prescribe the acceleration instead, or take dynamic_stiffness, which is K + C s + M s^2 here."
         )
         raise SignalNameError(msg, names=names)
-    forces, moves = force_names(model.dofs), motions(model.dofs)
+    forces = physical_places(model.inputs, model.dofs, "input")
+    moves = physical_places(model.outputs, model.dofs, "output")
     moved, reactions = motion_names(names, derivative), reaction_names(names)
-    _require_new(moved, (*model.inputs, *forces), "input")
-    _require_new(reactions, (*model.outputs, *moves), "output")
+    _require_new(moved, (*model.inputs, *physical_places(moved, model.dofs, "input")), "input")
+    _require_new(reactions, (*model.outputs, *physical_places(reactions, model.dofs, "output")), "output")
     lasting_inputs = [name for name in model.inputs if name not in forces]
     lasting_outputs = [name for name in model.outputs if name not in moves]
     return PrescribedSignals(
@@ -215,14 +217,16 @@ def with_motion_as_input(
 
 def _split(X: Coefficients, staying: int, derivative: int) -> tuple[list[Matrix], list[Matrix]]:
     """Split the columns of q_g into what stays with it and what goes with its derivative, the input."""
-    nothing = np.zeros_like(X[0])
+    nothing = 0.0 * X[0]
     stays = [X[k] if k < derivative else nothing for k in range(3)]
     goes = [X[k + derivative] if k + derivative < len(X) else nothing for k in range(3)]
     return [part[:, :staying] for part in stays], goes
 
 
 def _joined(blocks: list[list[Matrix]]) -> Matrix:
-    """Join blocks to one matrix, complex only where there are imaginary parts."""
+    """Join blocks to one matrix, complex only where there are imaginary parts; sparse if a block is."""
+    if has_sparse([block for row in blocks for block in row]):
+        return joined_sparse(blocks)
     whole: Matrix = np.block(blocks)
     return whole if np.iscomplexobj(whole) and whole.imag.any() else whole.real
 

@@ -7,8 +7,7 @@ labels, which finite-element labels such as ``101.1`` need, so a label writes it
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from itertools import chain
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 from halfdof_ctrl.errors import SignalNameError
 
@@ -17,6 +16,11 @@ Names: TypeAlias = str | Sequence[str] | None
 DERIVATIVE_SUFFIXES = ("", "_dot", "_ddot")
 FORCE_PREFIX = "F_"
 REACTION_PREFIX = "R_"
+SIGNAL_WORDS = {
+    "input": ("u", "the unit force on a DOF", "B"),
+    "output": ("y", "a DOF's motion", "F, G, H"),
+}  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
+MOST_CACHED = 1000  #: names of larger models are made anew each time, since a cache would hold on to them
 
 
 def control_label(name: str) -> str:
@@ -30,9 +34,13 @@ def control_label(name: str) -> str:
     return name
 
 
-@lru_cache(maxsize=256)
 def control_labels(names: tuple[str, ...]) -> tuple[str, ...]:
     """Write names as labels that python-control takes."""
+    return _cached_labels(names) if len(names) <= MOST_CACHED else tuple([control_label(name) for name in names])
+
+
+@lru_cache(maxsize=256)
+def _cached_labels(names: tuple[str, ...]) -> tuple[str, ...]:
     return tuple([control_label(name) for name in names])
 
 
@@ -45,11 +53,22 @@ def name_from_label(label: str) -> str:
     return label.replace(":", ".").replace("%3A", ":").replace("%25", "%")
 
 
-@lru_cache(maxsize=256)
 def motion_names(dofs: tuple[str, ...], derivative: int) -> tuple[str, ...]:
     """Names of the displacements (0), velocities (1) or accelerations (2) of the DOFs."""
-    suffix = DERIVATIVE_SUFFIXES[derivative]
-    return tuple([dof + suffix for dof in dofs])
+    if derivative == 0:
+        return dofs
+    return _affixed(dofs, "", DERIVATIVE_SUFFIXES[derivative])
+
+
+def force_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Names of the unit forces on the DOFs."""
+    return _affixed(dofs, FORCE_PREFIX, "")
+
+
+def _affixed(dofs: tuple[str, ...], prefix: str, suffix: str) -> tuple[str, ...]:
+    if len(dofs) <= MOST_CACHED:
+        return _cached_affixed(dofs, prefix, suffix)
+    return tuple([prefix + dof + suffix for dof in dofs])
 
 
 def derivative_name(dof: str, order: int, dofs: tuple[str, ...]) -> str:
@@ -67,9 +86,8 @@ def derivative_name(dof: str, order: int, dofs: tuple[str, ...]) -> str:
 
 
 @lru_cache(maxsize=256)
-def force_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
-    """Names of the unit forces on the DOFs."""
-    return tuple([FORCE_PREFIX + dof for dof in dofs])
+def _cached_affixed(dofs: tuple[str, ...], prefix: str, suffix: str) -> tuple[str, ...]:
+    return tuple([prefix + dof + suffix for dof in dofs])
 
 
 def reaction_names(dofs: tuple[str, ...]) -> tuple[str, ...]:
@@ -130,17 +148,22 @@ def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
         As `checked_names`, or a DOF is named like the velocity or acceleration of another.
     """
     names = (given,) if isinstance(given, str) else tuple(given)
-    return (
-        _checked_dofs(names, count) if all(type(name) is str for name in names) else checked_names(names, count, "DOFs")
-    )
+    if len(names) <= MOST_CACHED and all(type(name) is str for name in names):
+        return _cached_dofs(names, count)
+    return _checked_dofs(names, count)
 
 
 @lru_cache(maxsize=256)
+def _cached_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
+    return _checked_dofs(names, count)
+
+
 def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
     dofs = checked_names(names, count, "DOFs")
-    every = tuple(chain.from_iterable(motion_names(dofs, derivative) for derivative in range(3)))
-    if len(set(every)) != len(every):
-        clash = _duplicates(every)
+    derived = [name for name in dofs if name.endswith(DERIVATIVE_SUFFIXES[1:])]
+    places = dict.fromkeys(dofs) if derived else {}
+    clash = tuple([name for name in derived if any(stem in places for stem, _ in derivative_stems(name))])
+    if clash:
         msg = (
             f"{listed(clash)} would name both a DOF's motion and a derivative of another DOF's motion, "
             "since the velocity of y is called y_dot and its acceleration y_ddot. Rename one of the DOFs."
@@ -149,13 +172,59 @@ def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
     return dofs
 
 
+def derivative_stems(name: str) -> list[tuple[str, int]]:
+    """Give the names of which this one would be the velocity or acceleration, with the order of the derivative.
+
+    >>> derivative_stems("y_ddot"), derivative_stems("y")
+    ([('y', 2)], [])
+    """
+    return [
+        (name.removesuffix(suffix), order)
+        for order, suffix in enumerate(DERIVATIVE_SUFFIXES)
+        if suffix and name.endswith(suffix)
+    ]
+
+
 def as_tuple(names: Names) -> tuple[str, ...]:
     """Read one name, several or none as a tuple."""
     return (names,) if isinstance(names, str) else tuple(names or ())
 
 
+def physical_places(names: Iterable[str], dofs: tuple[str, ...], what: Literal["input", "output"]) -> dict[str, int]:
+    """Find which names are those of unit forces on DOFs (inputs), or of motions of DOFs (outputs).
+
+    Parameters
+    ----------
+    names : iterable of str
+    dofs : tuple of n str
+    what : {"input", "output"}
+
+    Returns
+    -------
+    dict from name to int
+        The DOF's position, for a velocity n more, for an acceleration 2n more; names of other things are left out.
+
+    Examples
+    --------
+    >>> physical_places(["b_ddot", "F_a"], ("a", "b"), "output")
+    {'b_ddot': 5}
+    """
+    stems: dict[str, list[tuple[str, int]]] = {}
+    for name in names:
+        if what == "input":
+            stems[name] = [(name.removeprefix(FORCE_PREFIX), 0)] if name.startswith(FORCE_PREFIX) else []
+        else:
+            stems[name] = [(name, 0), *derivative_stems(name)]
+    places = dict.fromkeys([stem for found in stems.values() for stem, _ in found], -1)
+    for index, dof in enumerate(dofs):
+        if dof in places:
+            places[dof] = index
+    n = len(dofs)
+    return {name: n * k + places[stem] for name, found in stems.items() for stem, k in found if places[stem] >= 0}
+
+
 def reconciled_names(
-    given: Names, found: Sequence[str | None], physical: tuple[str, ...], words: tuple[str, str, str, str]
+    given: Names, found: Sequence[str | None], dofs: tuple[str, ...], what: Literal["input", "output"]
 ) -> tuple[str, ...]:
     """Take the given names, or the ones found by what signals are, and refuse a physical name on another signal.
 
@@ -164,27 +233,27 @@ def reconciled_names(
     SignalNameError
         As `checked_names`, or a name of a force or motion on a signal that is something else.
     """
-    what, letter, meaning, matrices = words
+    letter, meaning, matrices = SIGNAL_WORDS[what]
     if given is None:
         physical_found = [name for name in found if name is not None]
         once = len(set(physical_found)) == len(physical_found)
         return tuple([name if name and once else f"{letter}[{i}]" for i, name in enumerate(found)])
-    names = checked_names(given, len(found), what)
-    reserved = set(physical)
-    wrong = tuple(
-        [name for name, by_matrix in zip(names, found, strict=True) if name in reserved and name != by_matrix]
-    )
+    names = checked_names(given, len(found), f"{what}s")
+    others = [name for name, by_matrix in zip(names, found, strict=True) if name != by_matrix]
+    wrong = tuple(physical_places(others, dofs, what)) if others else ()
     if wrong:
         msg = (
-            f"Among the {what}, {listed(wrong)} is the name of {meaning}, but {matrices} say something else. "
+            f"Among the {what}s, {listed(wrong)} is the name of {meaning}, but {matrices} say something else. "
             "Rename it, or take the physical signal by select()."
         )
         raise SignalNameError(msg, names=wrong)
     return names
 
 
-def picked_places(names: Names, own: tuple[str, ...], physical: tuple[str, ...], what: str) -> list[int]:
-    """Give the positions of names in a model's own signals followed by the physical ones.
+def picked_places(
+    names: Names, own: tuple[str, ...], dofs: tuple[str, ...], what: Literal["input", "output"]
+) -> list[int]:
+    """Give the positions of names in a model's own signals followed by the physical ones (see `physical_places`).
 
     Raises
     ------
@@ -196,10 +265,12 @@ def picked_places(names: Names, own: tuple[str, ...], physical: tuple[str, ...],
         msg = f"No {what} is selected: a model needs at least one."
         raise SignalNameError(msg, names=())
     checked_names(wanted, len(wanted), f"{what}s")
-    places = {name: len(own) + index for index, name in enumerate(physical)}
-    places.update({name: index for index, name in enumerate(own)})
+    places = {name: len(own) + place for name, place in physical_places(wanted, dofs, what).items()}
+    asked = set(wanted)
+    places.update({name: index for index, name in enumerate(own) if name in asked})
     for name in wanted:
         if name not in places:
+            physical = force_names(dofs) if what == "input" else tuple(motions(dofs))
             raise unknown_name_error(name, what, dict.fromkeys((*own, *physical)))
     return [places[name] for name in wanted]
 

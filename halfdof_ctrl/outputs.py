@@ -48,6 +48,8 @@ def without_rounding(model: SecondOrderModel, output: Signal, rounding: Rounding
 
     The bound evaluates (6) and (7) with the sizes that the rounding errors are relative to.
     """
+    if not output.U:
+        return output
     q = rounding.displacement
     bound = q.combined(np.abs(model.F))
     for order, matrix in ((1, model.G), (2, model.H)):

@@ -11,7 +11,7 @@ needs no mixing stays the DOF that it was. Derivation: docs/explanation/reductio
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Literal, TypeAlias
 
@@ -94,7 +94,7 @@ class DofPartition:
         """Names of the states: inertial and half displacements, then inertial velocities."""
         return (*self.inertial, *self.half, *motion_names(self.inertial, 1))
 
-    def kinds(self, dofs: tuple[str, ...]) -> dict[str, str]:
+    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
         """Tell for each of the model's DOFs that is not wholly inertial whether it is half or static."""
         moving = self.n_inertial + self.n_half
         return {
@@ -102,6 +102,11 @@ class DofPartition:
             for dof, row in zip(dofs, self.T, strict=True)
             if row[self.n_inertial :].any()
         }
+
+    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
+        """Give the states that belong to displacements and velocities of all n DOFs."""
+        from_q, from_v = self.state_maps()
+        return np.asarray(from_q @ displacements + from_v @ velocities)
 
     def state_maps(self) -> tuple[FloatArray, FloatArray]:
         """Give L_q and L_v, (N, n) each, of x = L_q q + L_v q'."""
@@ -155,7 +160,7 @@ def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPart
         A mass is not zero but below 1e-10 of the others in scaled units.
     """
     inertial, half = null_column_kinds(model.M, model.C)
-    if tol is not None or _spread_is_wide(model, inertial):
+    if tol is not None or spread_is_wide(model, inertial):
         inertial, half = _without_tiny_masses(model, inertial, 0.0 if tol is None else tol)
     return _selection(tuple(inertial.tolist()), tuple(half.tolist()), model.dofs)
 
@@ -187,16 +192,22 @@ def mass_ratios(model: SecondOrderModel) -> FloatArray:
     else acts on it, at the time scale of the heavy DOFs.
     """
     M, C, K = (np.abs(matrix) for matrix in (model.M, model.C, model.K))
-    speeds = _own_speeds(model)
+    speeds = own_speeds(model)
     gamma = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
     rows, columns = equilibrating_factors(K + gamma * C + gamma**2 * M, even=2.0)
     mass = (M * rows[:, None] * columns).max(axis=0)
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
 
 
-def _own_speeds(model: SecondOrderModel) -> FloatArray:
+def without_light_masses(model: SecondOrderModel, tol: float) -> SecondOrderModel:
+    """Take the mass from the DOFs whose `mass_ratios` are at most `tol`."""
+    light = model.M.any(axis=0) & (mass_ratios(model) <= tol)
+    return replace(model, M=read_only(np.where(light, 0.0, model.M))) if light.any() else model
+
+
+def own_speeds(model: SecondOrderModel) -> FloatArray:
     """Give max(K_jj / M_jj, (C_jj / M_jj)^2) of the DOFs with M_jj, zero for others: the same in any unit of them."""
-    mass, drag, stiffness = (np.abs(np.diagonal(matrix)) for matrix in (model.M, model.C, model.K))
+    mass, drag, stiffness = (np.abs(matrix.diagonal()) for matrix in (model.M, model.C, model.K))
     with_mass = np.where(mass > 0.0, mass, np.inf)
     return np.asarray(np.maximum(stiffness / with_mass, (drag / with_mass) ** 2))
 
@@ -242,11 +253,11 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
     )
 
 
-def _spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:
+def spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:
     """Tell cheaply whether some mass might be tiny against the others in some unit."""
     if len(inertial) == 1 or np.count_nonzero(inertial) <= 1:
         return False
-    speeds = _own_speeds(model)[inertial]
+    speeds = own_speeds(model)[inertial]
     return bool(speeds.max() > PLAIN_SPREAD * speeds.min())
 
 
@@ -256,9 +267,15 @@ def _without_tiny_masses(
     """Take masses up to `tol` as none, and warn of those that are tiny and stay."""
     ratio = mass_ratios(model)
     inertial = inertial & (ratio > tol)
+    warn_of_tiny_masses(ratio, inertial, model.dofs)
+    return inertial, model.C.any(axis=0) & ~inertial
+
+
+def warn_of_tiny_masses(ratio: FloatArray, inertial: npt.NDArray[np.bool_], dofs: tuple[str, ...]) -> None:
+    """Warn of DOFs whose mass is not zero but below 1e-10 of the largest, in the units of `mass_ratios`."""
     tiny = np.flatnonzero(inertial & (ratio < NEARLY_MASSLESS))
     if tiny.size:
-        names = [model.dofs[index] for index in tiny.tolist()]
+        names = [dofs[index] for index in tiny.tolist()]
         largest = float(ratio[tiny].max())
         msg = (
             f"DOFs {listed(names)} have a mass of at most {largest:.1e} of the largest (in scaled units), but not "
@@ -266,7 +283,6 @@ def _without_tiny_masses(
             f"massless, set their mass to zero or pass tol={2.0 * largest:.0e}."
         )
         warnings.warn(msg, NearlyMasslessWarning, stacklevel=callers_level())
-    return inertial, model.C.any(axis=0) & ~inertial
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -345,17 +361,25 @@ def cancelled(matrix: FloatArray, columns: FloatArray, sizes: FloatArray) -> Flo
 
 
 def _coordinate_names(basis: FloatArray, dofs: tuple[str, ...]) -> tuple[str, ...]:
-    """Name a column of T by its DOF if it selects one, else mix0, mix1, ... (clear of the DOFs' names)."""
+    """Name the columns of T."""
+    selected: list[int | None] = []
+    for column in basis.T:
+        entries = np.flatnonzero(column)
+        selected.append(int(entries[0]) if entries.size == 1 and column[entries[0]] == 1.0 else None)
+    return mixture_names(selected, dofs)
+
+
+def mixture_names(selected: list[int | None], dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Name a column of T by the DOF that it selects, else mix0, mix1, ... (clear of the DOFs' names)."""
     prefix = "mix"
     while any(dof.startswith(prefix) for dof in dofs):
         prefix += "_"
     names: list[str] = []
     mixtures = 0
-    for column in basis.T:
-        entries = np.flatnonzero(column)
-        if entries.size == 1 and column[entries[0]] == 1.0:
-            names.append(dofs[int(entries[0])])
-        else:
+    for place in selected:
+        if place is None:
             names.append(f"{prefix}{mixtures}")
             mixtures += 1
+        else:
+            names.append(dofs[place])
     return tuple(names)

@@ -1,237 +1,165 @@
-"""Finite structure of a pencil ``A - s E``, for the oracle: deflate what is not finite, then QZ.
+"""Finite and infinite structure of a pencil ``A - s E``, for the oracle: deflate what is not finite, then QZ.
 
-While E lacks row rank, a pivoted QR decomposition compresses its rows; the algebraic rows that appear
-eliminate as many unknowns, again orthogonally, and the rest is a smaller pencil with the same finite
-eigenvalues. The same on the transpose removes what a non-square or singular pencil has besides
-(P. Van Dooren, The computation of Kronecker's canonical form of a singular pencil, 1979).
+Deflation (`staircase`) of the rows removes what a pencil has at infinity; the same on the transpose removes what a
+non-square or singular pencil has besides.
 
-Eigenvalues are those of the diagonal blocks of the block triangular form of the pattern (A. L. Dulmage and
-N. S. Mendelsohn, 1963), found anew after each deflation: a triangle of many small pivots, singular to any norm, is then
-as regular as it looks. That needs zeros to be zero: each entry carries the mean square of its rounding error, and
-an entry within it is set to zero. The reduction knows nothing of this module.
+Eigenvalues are those of the diagonal blocks of the block triangular form of the pattern (`patterns`), found anew after
+each deflation: a triangle of many small pivots, singular to any norm, is then as regular as it looks. The
+reduction knows nothing of this module.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components, maximum_bipartite_matching
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.arrays import ComplexArray, Matrix
+from halfdof_ctrl.staircase import RANK_TOLERANCE, Evidence, Pencil, deflated, deflated_once
 
-EPS = float(np.finfo(float).eps)
-RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
-NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
-SWEEPS = 10  #: equilibration passes over rows and columns
-SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
+GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where a rank is looked at that holds almost everywhere
+CLEAR_MARGIN = 1000.0  #: a rank decision with less than this margin is looked at twice
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class FinitePart:
-    """What a pencil has at finite places and, where it is regular, at infinity."""
+    """What a pencil has at finite places."""
 
-    eigenvalues: ComplexArray  #: finite eigenvalues, by QZ on irreducible blocks
-    steps: tuple[int, ...]  #: eigenvalues at infinity deflated in each step; their number is the index
+    eigenvalues: ComplexArray  #: by QZ on irreducible blocks; those at the origin are exactly zero
     is_regular: bool  #: False if the pencil is not square or its determinant vanishes identically
-    is_deficient: bool  #: rows and columns are both dependent at every s; the eigenvalues are not reliable then
-    gap: float  #: smallest ratio, over all rank decisions, of a pivot that counts to one that does not
+    is_certain: bool  #: False if rank decisions are so close to rounding that the number may be wrong
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class InfinitePart:
+    """What a regular pencil has at infinity."""
+
+    steps: tuple[int, ...]  #: algebraic rows that each deflation took out
+    evidence: Evidence  #: how clear the rank decisions were
+
+    @property
+    def blocks(self) -> tuple[int, ...]:
+        """Sizes of the Jordan blocks, the largest first: the conjugate partition of `steps`."""
+        return tuple([sum(step > block for step in self.steps) for block in range(max(self.steps, default=0))])
 
 
 def finite_part(A: Matrix, E: Matrix) -> FinitePart:
-    """Find the finite eigenvalues of the pencil ``A - s E``, and its structure at infinity.
+    """Find the finite eigenvalues of the pencil ``A - s E``.
 
     Parameters
     ----------
     A, E : (k, l) ndarrays
-        Real or complex, square or not.
+        Real or complex, square or not, of any normal rank.
 
     Returns
     -------
     FinitePart
-        For a non-square pencil of full rank, the eigenvalues of its regular part.
+        For a pencil that is not regular, the eigenvalues of its regular part: where its rank drops.
+
+    Examples
+    --------
+    ``(s + 2, 0)`` has rank one but at -2:
+
+    >>> finite_part(np.array([[-2.0, 0.0]]), np.array([[1.0, 0.0]])).eigenvalues
+    array([-2.+0.j])
     """
-    pencil = _Pencil.exact(A, E)
-    rows = _deflated(pencil.equilibrated())
-    columns = _deflated(rows.pencil.transposed())
-    square = A.shape[0] == A.shape[1]
-    eigenvalues = _blockwise_eigenvalues(pencil) if square else None
-    if eigenvalues is None:  # rounding can lose eigenvalues of a singular pencil, not invent them: try both orders
-        first = _deflated(pencil.transposed().equilibrated())
-        both = (columns.pencil.eigenvalues(), _deflated(first.pencil.transposed()).pencil.eigenvalues())
-        eigenvalues = max(both, key=len)
+    pencil = Pencil.exact(A, E)
+    by_blocks = _by_blocks(pencil)
+    if by_blocks is not None and by_blocks.is_certain:
+        return by_blocks
+    both_ways = _both_ways(pencil)
+    if by_blocks is None:
+        return both_ways
+    agree = both_ways.eigenvalues.size == by_blocks.eigenvalues.size
+    return by_blocks if agree or not both_ways.is_certain else both_ways
+
+
+def infinite_part(A: Matrix, E: Matrix) -> InfinitePart:
+    """Find the structure at infinity of the pencil ``A - s E``, which must be regular.
+
+    Each deflation takes out the algebraic rows and as many unknowns, which makes every Jordan block at infinity
+    smaller by one. So step k counts the blocks of size k or more.
+
+    Examples
+    --------
+    Two equations without derivative, one of which says nothing new until it is differentiated:
+
+    >>> A, E = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]]), np.array([[0.0, 0, 0], [0, 0, 1], [0, 0, 0]])
+    >>> part = infinite_part(A, E)
+    >>> part.steps, part.blocks
+    ((2, 1), (2, 1))
+    """
+    staircase = deflated(Pencil.exact(A, E).equilibrated())
+    return InfinitePart(steps=staircase.steps, evidence=staircase.evidence)
+
+
+def _by_blocks(pencil: Pencil) -> FinitePart | None:
+    """Collect the eigenvalues of the diagonal blocks; None if one lacks the rank that its pattern has.
+
+    The determinant of a block triangular pencil, and the greatest common divisor of the largest minors where it is
+    not square, are the products of those of its blocks, if these have full rank.
+    """
+    found, evidence = [np.zeros(0, dtype=np.complex128)], Evidence()
+    waiting = pencil.diagonal_blocks()
+    is_square = all(block.E.shape[0] == block.E.shape[1] for block in waiting)
+    waiting = [block.transposed() if block.E.shape[0] < block.E.shape[1] else block for block in waiting]
+    while waiting:
+        block = waiting.pop()
+        step = deflated_once(block.equilibrated())
+        evidence = evidence.and_also(step.evidence)
+        if step.redundant > block.E.shape[0] - block.E.shape[1]:
+            return None
+        if step.algebraic == 0:  # E is nonsingular; what A lacks in rank are eigenvalues at the origin
+            step = deflated_once(step.pencil.reversed())
+            evidence = evidence.and_also(step.evidence)
+            if step.redundant:
+                return None
+            found.append(np.zeros(step.algebraic, dtype=np.complex128))
+            step = replace(step, pencil=step.pencil.reversed())
+        if step.algebraic == 0:
+            found.append(step.pencil.eigenvalues())
+            continue
+        blocks = step.pencil.diagonal_blocks()
+        if any(block.E.shape[0] < block.E.shape[1] for block in blocks):
+            return None
+        waiting += blocks
     return FinitePart(
-        eigenvalues=eigenvalues,
-        steps=tuple(rows.steps),
-        is_regular=square and not rows.redundant and not columns.steps,
-        is_deficient=bool(rows.redundant and columns.steps),
-        gap=min(rows.gap, columns.gap),
+        eigenvalues=np.concatenate(found), is_regular=is_square, is_certain=evidence.margin > CLEAR_MARGIN
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Pencil:
-    A: Matrix
-    E: Matrix
-    dA: FloatArray  #: mean squares of the rounding errors in A
-    dE: FloatArray  #: the same in E
+def _both_ways(pencil: Pencil) -> FinitePart:
+    """Deflate rows and then columns, and the other way round, and take the way that can be trusted.
 
-    @classmethod
-    def exact(cls, A: Matrix, E: Matrix) -> "_Pencil":
-        """Take entries as known to half a unit in the last place."""
-        return cls(A, E, (EPS * np.abs(A)) ** 2, (EPS * np.abs(E)) ** 2)
-
-    def transposed(self) -> "_Pencil":
-        return _Pencil(self.A.T, self.E.T, self.dA.T, self.dE.T)
-
-    def part(self, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]) -> "_Pencil":
-        place = np.ix_(rows, columns)
-        return _Pencil(self.A[place], self.E[place], self.dA[place], self.dE[place])
-
-    def equilibrated(self) -> "_Pencil":
-        """Bring the largest entries of the rows and columns of A and E together near one."""
-        rows, columns = equilibrating_powers(np.maximum(np.abs(self.A), np.abs(self.E)))
-        scale = rows[:, None] * columns
-        return _Pencil(self.A * scale, self.E * scale, self.dA * scale**2, self.dE * scale**2)
-
-    def from_left(self, left: Matrix) -> "_Pencil":
-        """Multiply by a matrix with orthonormal rows."""
-        A, dA = _product(left, self.A, self.dA)
-        E, dE = _product(left, self.E, self.dE)
-        return _Pencil(A, E, dA, dE)
-
-    def from_right(self, right: Matrix) -> "_Pencil":
-        """Multiply by a matrix with orthonormal columns."""
-        return self.transposed().from_left(right.T).transposed()
-
-    def eigenvalues(self) -> ComplexArray:
-        """Give the eigenvalues by QZ; E must be nonsingular."""
-        if self.E.shape[0] == 0:
-            return np.zeros(0, dtype=np.complex128)
-        return np.asarray(scipy.linalg.eigvals(self.A, self.E), dtype=np.complex128)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Step:
-    pencil: _Pencil  #: what is left
-    algebraic: int  #: rows without E that were taken out
-    redundant: int  #: of them, those that said nothing
-    gap: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Deflated:
-    pencil: _Pencil
-    steps: list[int]
-    redundant: int
-    gap: float
-
-
-def _deflated(pencil: _Pencil) -> _Deflated:
-    """Reduce a pencil until its E has full row rank."""
-    steps: list[int] = []
-    redundant, gap = 0, float("inf")
-    while True:
-        step = _deflated_once(pencil)
-        pencil, gap = step.pencil, min(gap, step.gap)
-        if step.algebraic == 0:
-            return _Deflated(pencil, steps, redundant, gap)
-        steps.append(step.algebraic)
-        redundant += step.redundant
-
-
-def _deflated_once(pencil: _Pencil) -> _Step:
-    """Take out the algebraic rows that there are."""
-    left, rank, gap = _range(pencil.E, pencil.dE)
-    algebraic = pencil.E.shape[0] - rank
-    if algebraic == 0:
-        return _Step(pencil, 0, 0, gap)
-    turned = pencil.from_left(left.conj().T)
-    size = powers_of_two(np.abs(turned.A[rank:]).max(axis=1, initial=0.0))[:, None]
-    right, pivots, second = _range((turned.A[rank:] * size).conj().T, (turned.dA[rank:] * size**2).T)
-    rest = _Pencil(turned.A[:rank], turned.E[:rank], turned.dA[:rank], turned.dE[:rank])
-    return _Step(rest.from_right(right[:, pivots:]), algebraic, algebraic - pivots, min(gap, second))
-
-
-def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, float]:
-    """Give an orthogonal matrix whose first columns span the range, the rank, and the gap behind it."""
-    if not matrix.any():
-        return np.eye(matrix.shape[0]), 0, float("inf")
-    left, triangle, _ = scipy.linalg.qr(matrix, pivoting=True)
-    pivots = np.abs(np.diagonal(triangle))
-    noise = NOISE * np.sqrt(squares.max())
-    rank = int(np.count_nonzero(pivots > max(RANK_TOLERANCE * max(matrix.shape) * pivots[0], noise)))
-    unclear = 0 < rank < pivots.size and pivots[rank] > 0.0
-    return left, rank, float(pivots[rank - 1] / pivots[rank]) if unclear else float("inf")
-
-
-def _blockwise_eigenvalues(pencil: _Pencil) -> ComplexArray | None:
-    """Collect the eigenvalues of irreducible blocks; None if one of them is singular."""
-    found: list[ComplexArray] = []
-    waiting = [pencil]
-    while waiting:
-        blocks = _irreducible_blocks(waiting.pop())
-        if blocks is None:
-            return None
-        for block in blocks:
-            step = _deflated_once(block.equilibrated())
-            if step.redundant:
-                return None
-            if step.algebraic == 0:
-                found.append(step.pencil.eigenvalues())
-            elif step.pencil.E.size:
-                waiting.append(step.pencil)
-    return np.concatenate([np.zeros(0, dtype=np.complex128), *found])
-
-
-def _irreducible_blocks(pencil: _Pencil) -> list[_Pencil] | None:
-    """Split by the block triangular form of the pattern; None if the pattern itself is singular."""
-    pattern = (pencil.A != 0.0) | (pencil.E != 0.0)
-    matched = maximum_bipartite_matching(csr_array(pattern), perm_type="column")
-    if (matched < 0).any():
-        return None
-    count, labels = connected_components(csr_array(pattern[:, matched]), directed=True, connection="strong")
-    members = [np.flatnonzero(labels == label) for label in range(count)]
-    return [pencil.part(rows, matched[rows].astype(np.intp)) for rows in members]
-
-
-def _product(left: Matrix, matrix: Matrix, squares: FloatArray) -> tuple[Matrix, FloatArray]:
-    """Multiply, follow the rounding errors in the mean, and set what lies within them to zero.
-
-    The rows of `left` are known to rounding of one wherever they are not exactly zero.
+    In a singular pencil a small perturbation can change everything (J. W. Demmel and B. Kagstrom, 1987). A way must
+    find as many rows and columns too many as the rank at generic points says, by clear decisions.
     """
-    product = left @ matrix
-    mean = np.abs(left) ** 2 @ squares + EPS**2 * ((left != 0.0).astype(float) @ np.abs(matrix) ** 2)
-    noise = np.abs(product) <= NOISE * np.sqrt(mean)
-    return np.where(noise, 0.0, product), np.where(noise, 0.0, mean)
+    rank, (rows, columns) = _normal_rank(pencil), pencil.E.shape
+    ways = []
+    for turned, surplus in (
+        (pencil, (rows - rank, columns - rank)),
+        (pencil.transposed(), (columns - rank, rows - rank)),
+    ):
+        first = deflated(turned.equilibrated())
+        second = deflated(first.pencil.transposed())
+        is_sound = (first.redundant, second.redundant) == surplus
+        is_clear = first.evidence.and_also(second.evidence).margin > CLEAR_MARGIN
+        ways.append((is_sound, is_clear, second.pencil.E.shape[0], second.pencil))
+    sound = [way for way in ways if way[0]]
+    best = max(sound or ways, key=lambda way: way[1:3])
+    agreed = len({way[2] for way in sound if way[1] == best[1]}) == 1
+    inner = _by_blocks(best[3])
+    return FinitePart(
+        eigenvalues=best[3].eigenvalues() if inner is None else inner.eigenvalues,
+        is_regular=rank == rows == columns,
+        is_certain=best[0] and best[1] and agreed,
+    )
 
 
-def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows and columns that bring their largest entries near one.
-
-    Rows and columns are divided by the square roots of their maxima in turns, zero ones left alone.
-    """
-    return _with_maxima_near_one(size, np.ones(size.shape[0]), np.ones(size.shape[1]))
-
-
-def balancing_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows and columns that bring their entries near one.
-
-    First in the mean of the logarithms, which has one solution whatever the units were (A. R. Curtis and J. K. Reid,
-    1972), then the largest entries.
-    """
-    present = (size > 0.0).astype(float)
-    logs = np.log2(np.where(size > 0.0, size, 1.0))
-    normal = np.block([[np.diag(present.sum(axis=1)), present], [present.T, np.diag(present.sum(axis=0))]])
-    right = -np.concatenate([logs.sum(axis=1), logs.sum(axis=0)])
-    means = np.exp2(np.linalg.solve(normal + SHIFT * np.eye(len(normal)), right))
-    return _with_maxima_near_one(size, means[: size.shape[0]], means[size.shape[0] :])
-
-
-def _with_maxima_near_one(size: FloatArray, rows: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    for _ in range(SWEEPS):
-        scaled = size * rows[:, None] * columns
-        down, across = np.sqrt(scaled.max(axis=1, initial=0.0)), np.sqrt(scaled.max(axis=0, initial=0.0))
-        rows, columns = rows / np.where(down > 0.0, down, 1.0), columns / np.where(across > 0.0, across, 1.0)
-    return np.exp2(np.round(np.log2(rows))), np.exp2(np.round(np.log2(columns)))
+def _normal_rank(pencil: Pencil) -> int:
+    """Find the rank at generic points, the largest of a few."""
+    scaled = pencil.equilibrated()
+    ranks = []
+    for s in GENERIC_POINTS:
+        values = scipy.linalg.svdvals(scaled.A - s * scaled.E)
+        ranks.append(int(np.count_nonzero(values > RANK_TOLERANCE * max(pencil.E.shape) * values.max(initial=0.0))))
+    return max(ranks)

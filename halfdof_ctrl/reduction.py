@@ -23,13 +23,14 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum
+from halfdof_ctrl.arrays import LARGEST_DENSE_COPY, FloatArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum, loss
 from halfdof_ctrl.errors import (
     CloseDecisionWarning,
     ComplexModelError,
     InconsistentStateError,
     LostDigitsWarning,
+    ModelSizeError,
     ParameterError,
     SingularLeadingMatrixError,
     callers_level,
@@ -38,11 +39,21 @@ from halfdof_ctrl.leading import SINGULAR, LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.outputs import output_signal, without_rounding
-from halfdof_ctrl.partition import DofPartition, RankDecision, orthonormal_bases, select_columns
+from halfdof_ctrl.partition import (
+    DofPartition,
+    RankDecision,
+    orthonormal_bases,
+    select_columns,
+    without_light_masses,
+)
 from halfdof_ctrl.recovery import RecoveredMotion, TimeResponse, forward_slope, given_values, require_consistent
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.singlesolve import leading_columns, rounding_of_solve, solved_at_once
+from halfdof_ctrl.sparsedisplacement import SparseDisplacement
+from halfdof_ctrl.sparselu import SparseLU
+from halfdof_ctrl.sparsepartition import SparsePartition
+from halfdof_ctrl.sparsereduction import SparseReduction, sparse_reduction
 
 Road: TypeAlias = Literal["selection", "orthogonal", "deflation"]
 
@@ -50,6 +61,8 @@ ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
+LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves
+LARGEST_CERTIFIED = 500  #: DOFs up to which a sparse model with mixed coordinates is reduced densely
 LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
 
 
@@ -61,11 +74,12 @@ class ExactReduction:
     """
 
     model: SecondOrderModel  #: the model that was reduced
-    partition: DofPartition | StateSelection  #: which coordinates are inertial, half and static
-    leading: LeadingMatrix | None  #: W of equation (2), factorized; None where the road is `deflation`
-    equations: StateEquations  #: A, B and the way back to q
+    partition: DofPartition | SparsePartition | StateSelection  #: which coordinates are inertial, half and static
+    leading: LeadingMatrix | SparseLU | None  #: W of equation (2), factorized; None where the road is `deflation`
+    equations: StateEquations | SparseReduction  #: A, B and the way back to q
     rcond: float  #: reciprocal condition number of W, or the smallest of the systems (18), on which the states rest
     known_rounding: Rounding | None = None  #: rounding errors of the equations, where the road has followed them
+    tol: float | None = None  #: what `exact_reduction` was given
 
     @property
     def A(self) -> FloatArray:  # noqa: N802
@@ -78,7 +92,7 @@ class ExactReduction:
         return self.equations.B
 
     @property
-    def displacement(self) -> Signal:
+    def displacement(self) -> Signal | SparseDisplacement:
         """All n displacements as functions of state and inputs, equation (4)."""
         return self.equations.displacement
 
@@ -103,9 +117,9 @@ class ExactReduction:
 
         Constraints of displacements give 3, of velocities 2.
         """
-        if isinstance(self.partition, DofPartition):
-            return int(self.partition.n_static > 0)
-        return _index(self)
+        if isinstance(self.partition, StateSelection):
+            return _index(self)
+        return int(self.partition.n_static > 0)
 
     @property
     def method(self) -> Road:
@@ -115,7 +129,7 @@ class ExactReduction:
     @property
     def evidence(self) -> tuple[RankDecision, ...]:
         """The singular values that decisions about ranks rest on, block by block; those of W come last."""
-        if self.leading is None or isinstance(self.partition, StateSelection):
+        if not isinstance(self.leading, LeadingMatrix) or not isinstance(self.partition, DofPartition):
             return self.partition.evidence
         values = self.leading.singular_values()
         bound = len(values) * SINGULAR * float(values.max(initial=0.0))
@@ -125,6 +139,8 @@ class ExactReduction:
     @property
     def output(self) -> Signal:
         """The model's outputs as functions of state, inputs and, where they are improper, derivatives of inputs."""
+        if isinstance(self.equations, SparseReduction):
+            return self.equations.displacement.output(self.model)
         return output_signal(self.model, self.equations, self._rounding)
 
     @property
@@ -161,8 +177,14 @@ class ExactReduction:
         return self.partition.states
 
     def motion(self, derivative: int) -> Signal:
-        """Give q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
-        signal = self.displacement
+        """Give q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs.
+
+        Raises
+        ------
+        ModelSizeError
+            A sparse model with so many DOFs and states that this is too large.
+        """
+        signal = self.displacement.whole() if isinstance(self.displacement, SparseDisplacement) else self.displacement
         for _ in range(derivative):
             signal = signal.derivative(self.A, self.B)
         return signal
@@ -201,13 +223,16 @@ class ExactReduction:
         q = given_values(q0, model.dofs, "displacement")
         v = given_values({} if v0 is None else v0, model.dofs, "velocity")
         u = np.broadcast_to(np.asarray(u0, dtype=float), (len(model.inputs),))
-        from_q, from_v = self.partition.state_maps()[:2]
-        x = from_q @ np.nan_to_num(q) + from_v @ np.nan_to_num(v)
+        x = self.partition.state_of(np.nan_to_num(q), np.nan_to_num(v))
         if self.shift:
             x = x - self.shift[0] @ u
         for derivative, given in enumerate((q, v)):
-            motion = self.motion(derivative)
-            required = motion.X @ x + motion.direct(u.size) @ u
+            if isinstance(self.displacement, SparseDisplacement):
+                at_rest = [np.zeros((u.size, 1))] * 3
+                required = self.displacement.motion_at(x[:, None], [u[:, None], *at_rest], derivative)[:, 0]
+            else:
+                motion = self.motion(derivative)
+                required = motion.X @ x + motion.direct(u.size) @ u
             require_consistent(motion_names(model.dofs, derivative), given, required)
         return x
 
@@ -237,6 +262,9 @@ class ExactReduction:
             )
             raise InconsistentStateError(msg, names=self.states, given=(), required=())
         time = np.asarray(response.t, dtype=float)
+        if isinstance(self.displacement, SparseDisplacement):
+            displacement, velocity = self.displacement.histories(x, u, time)
+            return RecoveredMotion(time=time, displacement=displacement, velocity=velocity, dofs=self.model.dofs)
         slopes = [u]
         histories = []
         for derivative in range(2):
@@ -262,14 +290,18 @@ class ExactReduction:
         )
 
     def _rounding(self) -> Rounding:
-        if self.known_rounding is not None or self.leading is None or isinstance(self.partition, StateSelection):
+        equations, partition, leading = self.equations, self.partition, self.leading
+        known = isinstance(equations, SparseReduction) or not isinstance(partition, DofPartition)
+        if known or not isinstance(leading, LeadingMatrix) or self.known_rounding is not None:
             return self.known_rounding  # type: ignore[return-value]
-        return rounding_of_solve(self.model, self.partition, self.leading, self.equations)
+        return rounding_of_solve(self.model, partition, leading, equations)  # type: ignore[arg-type]
 
     def _inverse_rows(self) -> FloatArray:
         if self.leading is None:
             msg = "W of equation (2) is singular, so that alpha and gamma, the rows of its inverse, do not exist."
             raise SingularLeadingMatrixError(msg, dofs=(), rcond=0.0)
+        if isinstance(self.displacement, SparseDisplacement):
+            return self.displacement.inverse_rows()
         return self.leading.solve(np.eye(len(self.model.dofs)))
 
 
@@ -282,8 +314,8 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         A real model with n DOFs.
     tol : float, optional
         Size of a mass, relative to the largest in scaled units, up to which it counts as none
-        (see `partition.select_columns` and `partition.orthonormal_bases`). By default only exact
-        zeros and rounding count as none.
+        (see `partition.select_columns` and `partition.orthonormal_bases`), and of singular values in
+        deflation. By default only exact zeros and rounding count as none.
     method : {"selection", "orthogonal", "deflation"}, optional
         Road to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
         deflation where they do too (index above one).
@@ -313,9 +345,11 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     NearlyMasslessWarning
         A mass is not zero but below 1e-10 of the others in scaled units.
     CloseDecisionWarning
-        A decision about a rank rests on singular values less than 1e3 apart.
+        A decision about a rank rests on singular values less than 1e3 apart, or W is hardly regular, or `tol`
+        is so large that deflation gives the state space of another model.
     LostDigitsWarning
-        After deflation, A and B lose more than 1e-8 of the largest entry of the transfer function.
+        A and B lose more than 1e-8 of the largest entry of the transfer function, because W, or J after
+        deflation, is ill conditioned.
 
     Notes
     -----
@@ -332,6 +366,11 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     if model.is_complex:
         raise complex_model_error(model)
     _require_valid(tol, method)
+    if model.is_sparse:
+        reduced = _sparsely_reduced(model, tol, method)
+        if reduced is not None:
+            return reduced
+        model = model.as_dense()
     found = None if method == "deflation" else _by_leading_matrix(model, tol, method)
     return _by_deflation(model, tol) if found is None else found
 
@@ -356,6 +395,30 @@ def _require_valid(tol: float | None, method: Road | None) -> None:
         raise ParameterError(msg, parameter="tol", value=tol)
 
 
+def _sparsely_reduced(model: SecondOrderModel, tol: float | None, method: Road | None) -> ExactReduction | None:
+    """Reduce a sparse model; None for the dense roads: a small one with a singular W or mixed coordinates."""
+    if method == "deflation":
+        return None
+    try:
+        parts = sparse_reduction(model, tol, method)
+    except (SingularLeadingMatrixError, ModelSizeError):
+        sizes = len(model.dofs), len(model.inputs), len(model.outputs)
+        if method is None and max(sizes) <= LARGEST_DENSE_COPY:
+            return None
+        raise
+    if parts.partition.method == "orthogonal" and method is None and len(model.dofs) <= LARGEST_CERTIFIED:
+        return None
+    _warn_of_close_decisions(parts.partition.evidence)
+    return ExactReduction(
+        model=model,
+        partition=parts.partition,
+        leading=parts.leading,
+        equations=parts,
+        rcond=parts.leading.rcond,
+        tol=tol,
+    )
+
+
 def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road | None) -> ExactReduction | None:
     """Take the first road whose W is nonsingular; None if there is none and no road was asked for."""
     if method != "orthogonal":
@@ -363,7 +426,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
         W = leading_columns(model, partition)
         leading = LeadingMatrix.factorized(W)
         if not leading.is_singular:
-            reduction = _reduced(model, partition, leading)
+            reduction = _reduced(model, partition, leading, tol)
             sure = method == "selection" or tol is not None or leading.rcond > SURELY_REGULAR
             if sure or has_spectrum(model, reduction.A):
                 return _warned(reduction)
@@ -373,7 +436,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
     W = leading_columns(model, partition)
     leading = LeadingMatrix.factorized(W)
     if not leading.is_singular:
-        reduction = _reduced(model, partition, leading)
+        reduction = _reduced(model, partition, leading, tol)
         sure = method == "orthogonal" or tol is not None
         if sure or has_spectrum(model, reduction.A):  # bases of null spaces rest on rank decisions
             return _warned(reduction)
@@ -382,13 +445,16 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
     return None
 
 
-def _reduced(model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix) -> ExactReduction:
+def _reduced(
+    model: SecondOrderModel, partition: DofPartition, leading: LeadingMatrix, tol: float | None
+) -> ExactReduction:
     return ExactReduction(
         model=model,
         partition=partition,
         leading=leading,
         equations=solved_at_once(model, partition, leading),
         rcond=leading.rcond,
+        tol=tol,
     )
 
 
@@ -401,19 +467,23 @@ def _warned(reduction: ExactReduction) -> ExactReduction:
             "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    equations = reduction.equations
+    if reduction.rcond < LOSS_SUSPECTED and reduction.tol is None and not isinstance(equations, SparseReduction):
+        _warn_of_lost_digits(loss(reduction.model, equations), reduction.rcond)
     return reduction
 
 
 def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
-    result = deflated(model, tol)
-    _warn_of_close_decisions(result.selection.evidence)
-    if result.loss > LOST:
+    result = deflated(model if tol is None else without_light_masses(model, tol), tol)
+    if result.certified:
+        _warn_of_close_decisions(result.selection.evidence)
+        _warn_of_lost_digits(result.loss, result.rcond)
+    else:
         msg = (
-            f"The state space is exact, but A and B in double precision lose {result.loss:.1e} of the largest entry of "
-            "the transfer function: the remaining equations are ill conditioned "
-            f"(reciprocal condition number {result.rcond:.1e}). descriptor_response keeps the digits."
+            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
+            "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
         )
-        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return ExactReduction(
         model=model,
         partition=result.selection,
@@ -421,7 +491,18 @@ def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
         equations=result.equations,
         rcond=result.rcond,
         known_rounding=result.rounding,
+        tol=tol,
     )
+
+
+def _warn_of_lost_digits(lost: float, rcond: float) -> None:
+    if lost > LOST:
+        msg = (
+            f"The state space is exact, but A and B in double precision lose {lost:.1e} of the largest entry of the "
+            "transfer function: the equations for the highest derivatives are ill conditioned "
+            f"(reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
+        )
+        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
 
 
 def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
@@ -443,7 +524,7 @@ def _index(reduction: ExactReduction) -> int:
     With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass, the
     transfer function grows as the inverse of (8) does.
     """
-    model = reduction.model
+    model = reduction.model if reduction.tol is None else without_light_masses(reduction.model, reduction.tol)
     unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
     probe = replace(
         model,
@@ -457,7 +538,7 @@ def _index(reduction: ExactReduction) -> int:
         Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
         Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
     )
-    result = deflated(probe)
+    result = deflated(probe, reduction.tol)
     grown = output_signal(probe, result.equations, lambda: result.rounding)
     return len(without_rounding(probe, grown, result.rounding).U)
 
@@ -479,7 +560,7 @@ def _singular_error(
         f"The leading matrix W = [M T_i, C T_c, K T_k] is singular to working precision (rcond {leading.rcond:.1e}, "
         f"by {partition.method}): the equations of motion do not determine the highest derivatives of DOFs "
         f"{listed(dofs)}. Either a rigid constraint or an algebraic loop of dampers or springs ties them (index "
-        "above one), or nothing resists their motion; pencil_structure tells which. Give them the mass, damper or "
-        "spring that the model left out, or eliminate the constraint."
+        "above one), or nothing resists their motion; pencil_structure tells which. Leave method out, so that "
+        "deflation is tried, or give them the mass, damper or spring that the model left out."
     )
     return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)

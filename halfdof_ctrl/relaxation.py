@@ -15,12 +15,14 @@ Decisions are taken in the irreducible blocks of J, scaled to be the same in any
 the mean square of its rounding error; what lies within it is zero.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.arrays import FloatArray, powers_of_two
 from halfdof_ctrl.offsets import BoolArray, IndexArray, Offsets, irreducible_blocks, structural_offsets
 from halfdof_ctrl.scaling import gap_threshold, levelling_factors, logarithmic_scaling
 
@@ -64,10 +66,19 @@ class RowSystem:
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Units:
-    """Powers of two between the model's units and those of a `RowSystem`: ``q = diag(columns) q~, s = time s~``."""
+    """Powers of two between the model's units and those of a `RowSystem`.
+
+    ``q = diag(columns) q~, u = diag(inputs) u~, s = time s~``
+    """
 
     columns: FloatArray  #: (n,)
+    inputs: FloatArray  #: (m,)
     time: float
+
+    def by_time(self, values: FloatArray, power: npt.ArrayLike) -> FloatArray:
+        """Give ``values time^power`` for integer powers, also where the factor alone is beyond all floats."""
+        exponent = math.frexp(self.time)[1] - 1
+        return np.asarray(np.ldexp(values, np.asarray(power, dtype=np.intc) * exponent))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -90,12 +101,15 @@ class Relaxed:
 
 
 def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
-    """Scale coefficients (3, n, n) and (3, n, m) by powers of two near the unit-free scaling."""
+    """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
     row_logs, column_logs, time_log = logarithmic_scaling(P)
     row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
     speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]
     rows = np.exp2(row_powers)[:, None]
-    scaled = np.concatenate([P * np.exp2(column_powers), B], axis=2) * rows * speed
+    first = powers_of_two(np.abs(B).max(axis=(0, 1), initial=0.0))
+    driven = B * first * rows * speed
+    second = powers_of_two(np.abs(driven).max(axis=(0, 1), initial=0.0))
+    scaled = np.concatenate([P * np.exp2(column_powers) * rows * speed, driven * second], axis=2)
     system = RowSystem(
         coefficients=scaled,
         variance=(EPS * scaled) ** 2,
@@ -103,7 +117,7 @@ def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
         column_logs=column_logs - column_powers,
         time_log=float(time_log - time_power),
     )
-    return system, Units(columns=np.exp2(column_powers), time=float(np.exp2(time_power)))
+    return system, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))
 
 
 def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Relaxed:
@@ -212,13 +226,12 @@ class _Block:
             sensitivity = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(sources.size)), axis=1)
             noise = self.variance[row].sum() + x**2 @ self.variance[sources].sum(axis=1)
             error = np.maximum(EPS * np.abs(x), sensitivity * np.sqrt(noise))
-            x = _shortest_dyadic(x, SNAP * error)
         ratio = self.row_factors[sources] / self.row_factors[row]
         return _Elimination(
             row=int(self.rows[row]),
             columns=self.columns,
             sources=self.rows[sources],
-            multipliers=x * ratio,
+            multipliers=_shortest_dyadic(x * ratio, SNAP * error * ratio),
             errors=error * ratio,
         )
 

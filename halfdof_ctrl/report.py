@@ -18,6 +18,7 @@ import numpy as np
 
 from halfdof_ctrl.containers import PathLike
 from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.densecopy import dense_copy
 from halfdof_ctrl.descriptor import pencil_structure
 from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.eigentable import EigenvalueTable, eigenvalue_table
@@ -84,6 +85,7 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     ...     write_report(hydromount().select("F_y", "y"), f"{parent}/report").passed
     True
     """
+    model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
     with warnings.catch_warnings(record=True) as caught:
@@ -143,6 +145,7 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     >>> default_effort(mechss([[0]], [[0]], [[4]]))
     {'F_q0': 0.125}
     """
+    model = dense_copy(model, "default_effort", "Give the weights.")
     size = np.abs(pencil_structure(model).finite_eigenvalues)
     moving = size[size > 1e-9 * size.max(initial=0.0)]
     s = float(np.exp(np.log(moving).mean())) if moving.size else 1.0

@@ -41,7 +41,7 @@ def equilibrating_factors(matrix: FloatArray, even: float = EVEN) -> tuple[Float
         by_row, by_column = np.maximum.reduce(size, axis=1, initial=0.0), np.maximum.reduce(size, axis=0, initial=0.0)
         if _is_even(by_row, even) and _is_even(by_column, even):
             break
-        down, across = _root(by_row), _root(by_column)
+        down, across = inverse_roots(by_row), inverse_roots(by_column)
         rows *= down
         columns *= across
         size *= down[:, None]
@@ -54,7 +54,7 @@ def _is_even(maxima: FloatArray, even: float) -> bool:
     return all([1.0 / even <= value <= even or value == 0.0 for value in maxima.tolist()])  # noqa: C419  # faster
 
 
-def _root(maxima: FloatArray) -> FloatArray:
+def inverse_roots(maxima: FloatArray) -> FloatArray:
     """Give the powers of two nearest to one over the square root, 1 for a zero."""
     exponents = np.frexp(maxima)[1]
     return np.asarray(np.ldexp(1.0, -((exponents + np.sign(exponents)) // 2)))

@@ -2,6 +2,8 @@
 
 w = X x + U_0 u + U_1 u' + U_2 u'' + ...,    x' = A x + B u                            (6)
 w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                            (7)
+
+Derivatives of the inputs in the equation of the state are absorbed by another choice of it, equation (5).
 """
 
 from dataclasses import dataclass

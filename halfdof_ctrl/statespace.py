@@ -10,7 +10,6 @@ from typing import Literal, TypeAlias
 
 import control
 import numpy as np
-import numpy.typing as npt
 
 from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.errors import ImproperError, ParameterError, SignalNameError
@@ -18,20 +17,21 @@ from halfdof_ctrl.model import SecondOrderModel, mechss
 from halfdof_ctrl.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.signals import Signal
+from halfdof_ctrl.sparsearrays import MatrixLike
 
 Improper: TypeAlias = Literal["refuse", "drop"]
 
 
 def mech2ss(
-    model: SecondOrderModel | ExactReduction | npt.ArrayLike | None,
-    C: npt.ArrayLike | None = None,
-    K: npt.ArrayLike | None = None,
-    B: npt.ArrayLike | None = None,
-    F: npt.ArrayLike | None = None,
-    G: npt.ArrayLike | None = None,
+    model: SecondOrderModel | ExactReduction | MatrixLike | None,
+    C: MatrixLike | None = None,
+    K: MatrixLike | None = None,
+    B: MatrixLike | None = None,
+    F: MatrixLike | None = None,
+    G: MatrixLike | None = None,
     *,
-    H: npt.ArrayLike | None = None,
-    D: npt.ArrayLike | None = None,
+    H: MatrixLike | None = None,
+    D: MatrixLike | None = None,
     dofs: Names = None,
     inputs: Names = None,
     outputs: Names = None,

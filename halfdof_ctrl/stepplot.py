@@ -34,6 +34,7 @@ from halfdof_ctrl.reduction import ExactReduction, exact_reduction
 from halfdof_ctrl.statespace import mech2ss
 
 NAMED_LINES = 8  #: recovered DOFs that the legend names
+MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn
 EVEN = 1e-6  #: relative differences between time steps that are rounding
 
 
@@ -54,7 +55,8 @@ def step_plot(
     sysdata : control.StateSpace or SecondOrderModel
         The outputs are `control.step_response` of the state space, for a model of `mech2ss` of it. Below them
         stand the displacements of its half and static DOFs, as `ExactReduction.recover` gives them (with
-        orthonormal bases, of every DOF that a half or static coordinate moves).
+        orthonormal bases, of every DOF that a half or static coordinate moves); not those of a sparse model with more
+        than 200 DOFs.
     timepts : (k,) array_like or float, optional
         Equidistant times [s], or the last time. By default `step_times` of the modes that are seen in the
         plot; python-control's own choice for a discrete-time system.
@@ -92,6 +94,8 @@ def step_plot(
     known = known_units(sysdata, units)
     reduction = exact_reduction(sysdata) if isinstance(sysdata, SecondOrderModel) else None
     sys: Any = sysdata if reduction is None else mech2ss(reduction)
+    if reduction is not None and reduction.model.is_sparse and len(reduction.model.dofs) > MOST_RECOVERED:
+        reduction = None  # nobody could tell so many curves apart
     response = control.step_response(sys, _times(sys, reduction, timepts), squeeze=False)
     time, outputs = np.asarray(response.time), np.asarray(response.outputs)
     (p, m), panels = outputs.shape[:2], _panels(reduction, known)
@@ -104,7 +108,7 @@ def step_plot(
             time, outputs[i, j], label=f"{prefix}outputs" if panels or prefix else "_outputs", **style
         )
     if reduction is not None and panels:
-        motion, kinds = reduction.recover(response), reduction.partition.kinds(reduction.model.dofs)
+        motion, kinds = reduction.recover(response), reduction.partition.kinds_of(reduction.model.dofs)
         for (row, (unit, dofs)), j in product(enumerate(panels.items(), start=p), range(m)):
             histories = [motion[dof][j] for dof in dofs]
             lines[row, j] += _draw_recovered(axes[row, j], time, histories, {d: kinds[d] for d in dofs}, prefix)
@@ -140,7 +144,7 @@ def _times(
 def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:
     """Group the DOFs that are recovered by the unit they are drawn in."""
     groups: dict[str, list[str]] = {}
-    for dof in [] if reduction is None else reduction.partition.kinds(reduction.model.dofs):
+    for dof in [] if reduction is None else reduction.partition.kinds_of(reduction.model.dofs):
         groups.setdefault(f" [{typeset(units[dof])}]" if dof in units else "", []).append(dof)
     return groups
 

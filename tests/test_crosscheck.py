@@ -226,7 +226,7 @@ def test_complex_model_is_refused() -> None:
 
 def test_singular_pencil_is_refused_by_name() -> None:
     """A node that floats has no transfer function."""
-    with pytest.raises(SingularPencilError, match="DOFs b can move"):
+    with pytest.raises(SingularPencilError, match="DOF b can move"):
         crosscheck(
             mechss(np.diag([1, 0]), None, np.diag([1, 0]), [1, 0], [1, 0], dofs=["a", "b"]),
             control.ss([[0, 1], [-1, 0]], [[0], [1]], [[1, 0]], [[0]]),

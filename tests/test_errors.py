@@ -17,6 +17,7 @@ from halfdof_ctrl.errors import (
     LostDigitsWarning,
     MatrixError,
     MissingExtraError,
+    ModelSizeError,
     NearlyMasslessWarning,
     ParameterError,
     SignalNameError,
@@ -35,7 +36,7 @@ EXAMPLES: list[HalfdofError] = [
     SignalNameError("no such name", names=("a",)),
     ParameterError("m = -1", parameter="m", value=-1.0),
     SingularLeadingMatrixError("W is singular", dofs=("a", "b"), rcond=1e-18),
-    SingularPencilError("floats", dofs=("a",)),
+    SingularPencilError("floats", dofs=("a",), equations=("b",)),
     UncertainRankError("close", dofs=("a",), gap=2.0),
     ImproperError("grows", pairs=(("u", "y", 2),)),
     InconsistentStateError("contradicts", names=("a",), given=(1.0,), required=(2.0,)),
@@ -44,6 +45,7 @@ EXAMPLES: list[HalfdofError] = [
     FileFormatError("truncated", path="model.mtx", line=3),
     MissingExtraError("needs h5py", path="model.mat", extra="hdf5"),
     WorkerError("cannot start", function="hydromount"),
+    ModelSizeError("too many states", size=400_000, limit=8192),
 ]
 
 

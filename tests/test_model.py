@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, structures
 
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import MatrixError, SignalNameError
+from halfdof_ctrl.errors import MatrixError, ModelSizeError, SignalNameError
+from halfdof_ctrl.model import LETTERS
 
 ROUNDOFF = 1e-12  # direct solves of small matrices with small integer entries
 EXACT = 1e-10  # the same with n <= 12 and conditions up to 1e6
@@ -74,13 +75,69 @@ def test_wrong_matrices_are_refused_by_letter(arguments: dict[str, object], word
         mechss(**given_arguments)  # type: ignore[arg-type]
 
 
-def test_sparse_matrices_are_taken() -> None:
-    """Sparse arrays give the model of their dense form."""
-    M, C, K = (scipy.sparse.csc_array(matrix) for matrix in (np.eye(2), np.eye(2), 2 * np.eye(2)))
-    B = scipy.sparse.csr_array([[1.0], [0.0]])
-    model = mechss(M, C, K, B)  # type: ignore[arg-type]  # npt.ArrayLike does not know sparse arrays
-    assert_array_equal(model.K, 2 * np.eye(2))
-    assert model.inputs == ("F_q0",)
+def test_sparse_matrices_stay_sparse() -> None:
+    """One of M, C, K is enough; as_dense gives the dense model, with the same names."""
+    M, K = np.diag([1.0, 0.0]), np.array([[2.0, -1.0], [-1.0, 1.0]])
+    model, dense = mechss(scipy.sparse.csr_array(M), None, K), mechss(M, None, K)
+    assert model.is_sparse
+    assert not dense.is_sparse
+    for letter in LETTERS:
+        matrix, expected = getattr(model, letter), getattr(dense, letter)
+        assert isinstance(matrix, scipy.sparse.csc_array)
+        assert_array_equal(matrix.toarray(), expected)
+        assert_array_equal(getattr(model.as_dense(), letter), expected)
+        with pytest.raises(ValueError, match="read-only"):
+            matrix.indptr[0] = 1
+    assert repr(model) == repr(dense)
+    assert dense.as_dense() is dense
+    assert not mechss(M, None, K, scipy.sparse.csc_array([[1.0], [0.0]])).is_sparse
+
+
+def test_names_and_selection_of_a_sparse_model_are_those_of_the_dense_one() -> None:
+    """Unit columns and rows are recognized, physical names guarded, any DOF and derivative selected."""
+    M, K, B = np.diag([1.0, 0.0, 2.0]), 2.0 * np.eye(3), np.array([[1.0, 0], [0, 0], [0, 2.0]])
+    F, G, D = np.array([[0.0, 1, 0], [0, 0, 0]]), np.array([[0.0, 0, 0], [0, 0, 1]]), np.array([[0.0, 0], [0, 5.0]])
+    dense = mechss(M, None, K, B, F, G, D=D, dofs=["a", "b", "c"])
+    sparse = mechss(scipy.sparse.csc_array(M), None, K, B, scipy.sparse.csr_array(F), G, D=D, dofs=["a", "b", "c"])
+    assert (sparse.inputs, sparse.outputs) == (dense.inputs, dense.outputs) == (("F_a", "u[1]"), ("b", "y[1]"))
+    chosen = {"inputs": ["F_b", "u[1]"], "outputs": ["c_ddot", "y[1]", "b_dot", "a"]}
+    for letter in LETTERS:
+        expected = getattr(dense.select(**chosen), letter)
+        assert_array_equal(getattr(sparse.select(**chosen), letter).toarray(), expected)
+    for options, words in (
+        ({"inputs": ["F_b", "x"]}, "F_b is the name of"),
+        ({"outputs": ["b", "a"]}, "a is the name"),
+    ):
+        with pytest.raises(SignalNameError, match=words):
+            mechss(scipy.sparse.csc_array(M), None, K, B, F, G, dofs=["a", "b", "c"], **options)  # type: ignore[arg-type]
+    with pytest.raises(SignalNameError, match="no input 'F_z'"):
+        sparse.select("F_z")
+
+
+def test_the_motion_of_a_sparse_model_is_prescribed_as_that_of_a_dense_one() -> None:
+    """Base excitation by displacement and by acceleration."""
+    M, K = np.diag([2.0, 0.0, 1.0]), np.array([[8.0, -8, 0], [-8, 9, -1], [0, -1, 1]])
+    for kind in ("displacement", "acceleration"):
+        sparse, dense = (
+            mechss(form(M), None, K).prescribe_motion("q1", kind) for form in (scipy.sparse.csr_array, np.array)
+        )
+        assert sparse.is_sparse
+        for letter in LETTERS:
+            assert_array_equal(getattr(sparse, letter).toarray(), getattr(dense, letter))
+            assert isinstance(getattr(sparse, letter), scipy.sparse.csc_array)
+
+
+def test_half_a_million_dofs_take_a_moment() -> None:
+    """Names, checks, selection and repr are linear in the size: no n x n matrix, no table of all names."""
+    n = 500_000
+    diagonal = scipy.sparse.dia_array(scipy.sparse.eye_array(n))
+    model = mechss(None, diagonal, diagonal, name="many")
+    assert model.inputs[-1] == "F_q499999"
+    assert repr(model).startswith("SecondOrderModel 'many': 500000 DOFs: 0 inertial, 500000 half, 0 static")
+    small = model.select(["F_q7", "F_q499999"], ["q7", "q8_dot"])
+    assert (small.B.shape, small.G.shape, small.D.shape) == ((n, 2), (2, n), (2, 2))
+    with pytest.raises(ModelSizeError, match=r"Dense matrices of 500000 DOFs, 2 inputs and 2 outputs .* 2e\+03 GB"):
+        small.as_dense()
 
 
 def test_zero_may_stand_for_a_matrix_of_zeros() -> None:

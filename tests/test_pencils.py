@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl.arrays import powers_of_two
-from halfdof_ctrl.pencils import equilibrating_powers, finite_part
+from halfdof_ctrl.balancing import equilibrating_powers
+from halfdof_ctrl.pencils import finite_part, infinite_part
 
 EIGENVALUES = 1e-9  # after transformations of condition up to 1e3 on at most 10 unknowns
 
@@ -43,30 +44,27 @@ FINITE = (np.diag([-1.0, 2.0, -3.0]), np.eye(3))
 
 
 @given(seed=st.integers(0, 2**32 - 1), sizes=st.lists(st.integers(1, 3), max_size=3))
-def test_finite_eigenvalues_index_and_steps_are_found(seed: int, sizes: list[int]) -> None:
-    """Finite part -1, 2, -3 beside infinite Jordan blocks: their sizes give the steps, the largest the index."""
+def test_finite_eigenvalues_and_infinite_blocks_are_found(seed: int, sizes: list[int]) -> None:
+    """Finite part -1, 2, -3 beside infinite Jordan blocks; step k takes one off each of size k or more."""
     A, E = hidden(*together(FINITE, *((np.eye(size), nilpotent(size)) for size in sizes)), seed)
     part = finite_part(A, E)
     assert part.is_regular
-    assert part.steps == tuple(sum(size >= step for size in sizes) for step in range(1, max(sizes, default=0) + 1))
+    infinite = infinite_part(A, E)
+    assert infinite.blocks == tuple(sorted(sizes, reverse=True))
+    assert infinite.steps == tuple(sum(size >= step for size in sizes) for step in range(1, max(sizes, default=0) + 1))
     assert_allclose(np.sort(part.eigenvalues.real), [-3.0, -1.0, 2.0], rtol=EIGENVALUES)
     assert_allclose(part.eigenvalues.imag, 0.0, rtol=0.0, atol=EIGENVALUES)
 
 
 @given(seed=st.integers(0, 2**32 - 1), rows=st.integers(0, 2), columns=st.integers(0, 2))
 def test_singular_pencils_are_known_and_keep_their_regular_part(seed: int, rows: int, columns: int) -> None:
-    """Kronecker blocks L_2 and L_1^T beside a regular part: not regular, finite eigenvalues all the same.
-
-    Where rows and columns are both dependent that is said, and no eigenvalues are promised.
-    """
+    """Kronecker blocks L_2 and L_1^T, or both, beside a regular part: not regular, finite eigenvalues all the same."""
     wide = [(np.eye(2, 3), np.eye(2, 3, 1))] * columns
     tall = [(np.eye(2, 1), np.eye(2, 1, -1))] * rows
     A, E = hidden(*together(FINITE, *wide, *tall, (np.eye(2), nilpotent(2))), seed)
     part = finite_part(A, E)
     assert part.is_regular == (rows == columns == 0)
-    assert part.is_deficient == (rows > 0 and columns > 0)
-    if part.is_deficient:
-        return
+    assert part.is_certain
     assert_allclose(np.sort(part.eigenvalues.real), [-3.0, -1.0, 2.0], rtol=EIGENVALUES)
 
 
@@ -87,7 +85,8 @@ def test_empty_pencil_is_regular() -> None:
 def test_algebraic_pencil_has_no_eigenvalues() -> None:
     """E = 0, A nonsingular: index one, nothing finite."""
     part = finite_part(np.array([[2.0, 1.0], [0.0, 1.0]]), np.zeros((2, 2)))
-    assert (part.is_regular, part.steps, part.eigenvalues.size) == (True, (2,), 0)
+    assert (part.is_regular, part.eigenvalues.size) == (True, 0)
+    assert infinite_part(np.array([[2.0, 1.0], [0.0, 1.0]]), np.zeros((2, 2))).blocks == (1, 1)
 
 
 @given(seed=st.integers(0, 2**32 - 1), power=st.integers(0, 12))
@@ -96,8 +95,9 @@ def test_units_do_not_change_the_structure(seed: int, power: int) -> None:
     generator = np.random.default_rng(seed)
     A, E = hidden(*together(FINITE, (np.eye(2), nilpotent(2)), (np.eye(1), nilpotent(1))), 1)
     rows, columns = 10.0 ** generator.integers(-power, power + 1, (2, 6))
-    part = finite_part(rows[:, None] * A * columns, rows[:, None] * E * columns)
-    assert part.steps == (2, 1)
+    A, E = rows[:, None] * A * columns, rows[:, None] * E * columns
+    part = finite_part(A, E)
+    assert infinite_part(A, E).blocks == (2, 1)
     assert_allclose(np.sort(part.eigenvalues.real), [-3.0, -1.0, 2.0], rtol=EIGENVALUES)
 
 
@@ -110,9 +110,9 @@ def test_complex_pencils_are_taken() -> None:
 def test_rank_gap_is_reported() -> None:
     """A singular value of 1e-16 beside 1 is called zero, and the gap says how clear that was."""
     turn = np.linalg.qr(np.random.default_rng(0).standard_normal((3, 3)))[0]
-    part = finite_part(np.eye(3), turn @ np.diag([1.0, 2.0, 0.0]) @ turn.T)
-    assert part.steps == (1,)
-    assert part.gap > 1e10
+    part = infinite_part(np.eye(3), turn @ np.diag([1.0, 2.0, 0.0]) @ turn.T)
+    assert part.blocks == (1,)
+    assert part.evidence.gap > 1e10
 
 
 @given(seed=st.integers(0, 2**32 - 1), spread=st.integers(0, 200))

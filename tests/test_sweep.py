@@ -249,7 +249,7 @@ def test_nothing_is_there_where_every_case_failed() -> None:
             {"outputs": "y_ddot"},
             "SignalNameError: The model has no output 'y_ddot'",
         ),
-        (lambda x: mechss([[0, 0], [0, x]], None, np.diag([0, 1])), {}, "SingularPencilError: .* DOFs q0"),
+        (lambda x: mechss([[0, 0], [0, x]], None, np.diag([0, 1])), {}, "SingularPencilError: .* DOF q0"),
     ],
     ids=["text", "ragged", "number", "number with input", "no response", "name", "name of a system", "floating"],
 )

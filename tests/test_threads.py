@@ -13,8 +13,8 @@ from halfdof_ctrl.threads import available_cores, limited_threads
 
 
 def thread_counts() -> list[int]:
-    """Give the number of threads of each library."""
-    return [library["num_threads"] for library in threadpoolctl.threadpool_info()]
+    """Give the number of threads of each library of linear algebra."""
+    return [library["num_threads"] for library in threadpoolctl.threadpool_info() if library["user_api"] == "blas"]
 
 
 def test_workers_have_their_share_of_the_cores() -> None:
