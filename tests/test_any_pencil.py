@@ -38,13 +38,14 @@ from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech
 from halfdof_ctrl.errors import ImproperError, LostDigitsWarning, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
+LOST = 1e-3  # the same where LostDigitsWarning was given
 FAR = 1e-10  # in the roll-off, relative to the largest entry at any frequency
 COEFFICIENT = 1e-8  # of the polynomial part, relative to the largest of the same power of s
 CHARACTERISTIC = 1e-8  # det(sI - A), relative
 EIGENVALUE = 1e-8  # to the power of the multiplicity, relative to the size of A
 UNITS = 1e-8  # answers in other units, relative to the largest entry at each frequency
 
-POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 ROLL_OFF: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s]
 
 DEFAULT = settings().max_examples
@@ -140,12 +141,12 @@ def test_transfer_function_is_exact_at_each_frequency(case: tuple[Structure, Sec
     """State space and polynomial part together are H(s), to 1e-8 of the largest entry at each point.
 
     What two huge parts of an improper H(s) leave of each other is compared with these parts. A model so ill
-    conditioned that no A and B in double precision keep the digits must be announced as such.
+    conditioned that A and B in double precision lose more must be announced as such, and have some digits.
     """
     exact = rational_transfer(case[1])
     assume(exact.order >= 0)
     reduction, lost = reduced_aloud(case[1])
-    assert lost or errors(complete(reduction), exact).max() <= TRANSFER
+    assert errors(complete(reduction), exact).max() <= (LOST if lost else TRANSFER)
 
 
 @THOUSANDS

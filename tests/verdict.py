@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import control
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 from rational import RationalTransfer
+from scipy.linalg.lapack import dgebal
 from scipy.optimize import linear_sum_assignment
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -37,8 +37,8 @@ class Improved:
 
     def balanced(self) -> "Improved":
         """Give the system with its states in units of a balanced A: powers of two, so that nothing is rounded."""
-        A, (scale, _) = scipy.linalg.matrix_balance(self.A, permute=False, separate=True)
-        return Improved(np.asarray(A, dtype=float), self.B / scale[:, None], self.C * scale, self.D, self.polynomial)
+        A, scale = balanced(self.A)
+        return Improved(A, self.B / scale[:, None], self.C * scale, self.D, self.polynomial)
 
     def at(self, points: npt.ArrayLike) -> ComplexArray:
         """Evaluate by a plain solve at each point: (p, m, k)."""
@@ -47,6 +47,14 @@ class Improved:
             self.C @ np.linalg.solve(s * unit - self.A, self.B) + self.D for s in np.atleast_1d(np.asarray(points))
         ]
         return np.stack(values, axis=2) + polynomial_at(self.polynomial, points, self.D.shape)
+
+
+def balanced(A: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Balance rows and columns by powers of two: LAPACK itself, as scipy's wrapper fails where units lie far apart."""
+    if not len(A):
+        return A, np.ones(0)
+    even, _, _, scale, _ = dgebal(A, permute=0, scale=1)
+    return np.asarray(even, dtype=float), np.asarray(scale, dtype=float)
 
 
 def polynomial_at(parts: tuple[FloatArray, ...], points: npt.ArrayLike, shape: tuple[int, ...]) -> ComplexArray:
@@ -112,9 +120,9 @@ def eigenvalue_error(A: FloatArray, exact: RationalTransfer, floor: float = 1.0)
         return float("inf")
     if not len(A):
         return 0.0
-    balanced = scipy.linalg.matrix_balance(A, permute=False)[0]
-    scale = max(float(np.linalg.norm(balanced, 2)), float(np.abs(values).max()), floor)
-    found = np.linalg.eigvals(balanced) / scale
+    even, _ = balanced(A)
+    scale = max(float(np.linalg.norm(even, 2)), float(np.abs(values).max()), floor)
+    found = np.linalg.eigvals(even) / scale
     wanted, powers = np.repeat(values, times) / scale, np.repeat(times, times)
     distance = np.abs(found[:, None] - wanted)
     rows, columns = linear_sum_assignment(distance)

@@ -34,8 +34,9 @@ import halfdof_ctrl as hd
 from halfdof_ctrl.errors import ImproperError, SingularPencilError
 from halfdof_ctrl.model import LETTERS
 
-POINTS = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+POINTS = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
+ANNOUNCED = 1e5  #: times the limits may be lost where LostDigitsWarning says so
 LIMITS = {
     "transfer": 1e-8,
     "proper": 1e-8,
@@ -81,8 +82,9 @@ def judged(structure: Structure, model: hd.SecondOrderModel, tau: float = 1.0) -
     if (reduction.index, reduction.n_infinite) != (finding.index, 2 * structure.size - exact.order):
         finding.complaints.append(f"index {reduction.index}, n_infinite {reduction.n_infinite}")
     _judge_channels(finding, model, reduction, exact, tau)
+    allowed = ANNOUNCED if "LostDigitsWarning" in finding.said else 1.0
     finding.complaints += [
-        f"{what} error {error:.1e}" for what, error in finding.errors.items() if not error <= LIMITS[what]
+        f"{what} error {error:.1e}" for what, error in finding.errors.items() if not error <= allowed * LIMITS[what]
     ]
     return finding
 
