@@ -21,7 +21,7 @@ TEXT_SIZE = 16.0
 WORD_JOINER = "\N{WORD JOINER}"  # keeps a comma on the line of the formula before it
 OPENING = re.compile(r'<svg (?:xmlns[^ ]*="[^"]*" )+width="([\d.]+)" height="([\d.]+)"')
 
-SYMBOL = re.compile(r'<symbol id="([^"]*)".*?</symbol>', re.DOTALL)
+SYMBOL = re.compile(r'<symbol id="([^"]*)"[^>]*?(?:/>|>.*?</symbol>)', re.DOTALL)  # a blank closes itself
 
 
 def setup(app: Sphinx) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def _with_new_symbols(drawing: str, drawn: dict[str, str]) -> str:
         if name not in drawn:
             drawn[name] = shape
             return shape
-        if drawn[name] != shape:
+        if drawn[name] != shape and not shape.endswith("/>"):
             msg = f"Two shapes are called {name}."
             raise ExtensionError(msg)
         return ""
