@@ -19,6 +19,7 @@ from halfdof_ctrl.report import write_report
 from halfdof_ctrl.response import descriptor_response, frequency_response
 from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.stiffness import dynamic_stiffness, transmissibility
+from halfdof_ctrl.truncation import TruncatedModel, truncate_modes
 
 __version__ = "0.1.0"
 
@@ -29,6 +30,7 @@ __all__ = [
     "PencilStructure",
     "SecondOrderModel",
     "StateFeedback",
+    "TruncatedModel",
     "bode_plot",
     "crosscheck",
     "descriptor_response",
@@ -50,6 +52,7 @@ __all__ = [
     "step_plot",
     "transmissibility",
     "transmissibility_plot",
+    "truncate_modes",
     "write_report",
     "zeros",
 ]

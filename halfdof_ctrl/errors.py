@@ -148,3 +148,11 @@ def callers_level() -> int:
 
 class NearlyMasslessWarning(UserWarning):
     """A DOF has a mass so small against the others that its two states cost digits."""
+
+
+class TruncationWarning(UserWarning):
+    """A small model is far from the full one somewhere in the band that matters."""
+
+
+class InterruptedResponseWarning(UserWarning):
+    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""

@@ -1,0 +1,100 @@
+"""Progress is shown to somebody who watches, and to nobody else."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from halfdof_ctrl import progress as module
+from halfdof_ctrl.progress import progress, progress_bar, silence
+
+
+@pytest.fixture(autouse=True)
+def _at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Show bars without the delay that hides short runs."""
+    monkeypatch.setattr(module, "DELAY", 0.0)
+
+
+def terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make the captured stderr pass for a terminal."""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
+
+
+def test_steps_come_through_unchanged(capsys: pytest.CaptureFixture[str]) -> None:
+    """A list, or a generator whose length nobody knows; without a terminal nothing is shown."""
+    assert list(progress([3, 1, 2], "steps")) == [3, 1, 2]
+    assert list(progress((k * k for k in range(3)), "steps", total=3)) == [0, 1, 4]
+    assert capsys.readouterr().err == ""
+
+
+def test_a_terminal_shows_what_is_done(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The bar names the steps and ends full."""
+    terminal(monkeypatch)
+    assert sum(progress([1, 2, 3], "frequencies")) == 6
+    shown = capsys.readouterr().err
+    assert "frequencies: 100%" in shown
+    assert "3/3" in shown
+
+
+def test_a_notebook_shows_what_is_done(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its stderr is no terminal, but its shell has a kernel."""
+    shell = SimpleNamespace(kernel=object())
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
+    with progress_bar(4, "cases") as advance:
+        advance(3)
+    assert "3/4" in capsys.readouterr().err
+
+
+def test_a_short_run_shows_nothing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Below the delay, even on a terminal."""
+    terminal(monkeypatch)
+    monkeypatch.setattr(module, "DELAY", 60.0)
+    list(progress([1, 2, 3], "steps"))
+    assert "100%" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("show", [None, True])
+def test_inside_silence_nothing_is_shown(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    show: bool | None,  # noqa: FBT001
+) -> None:
+    """The cases of a sweep draw no bars of their own."""
+    terminal(monkeypatch)
+    with silence():
+        list(progress([1, 2], "steps", show=show))
+    assert capsys.readouterr().err == ""
+    list(progress([1, 2], "steps", show=show))
+    assert "2/2" in capsys.readouterr().err
+
+
+def test_nothing_is_shown_on_request(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of False, on a terminal."""
+    terminal(monkeypatch)
+    list(progress([1, 2], "steps", show=False))
+    assert capsys.readouterr().err == ""
+
+
+def test_the_switch_of_tqdm_is_left_to_the_user(monkeypatch: pytest.MonkeyPatch) -> None:
+    """``TQDM_DISABLE`` is the default of an argument that is not given; False would overrule it."""
+    given: list[dict[str, Any]] = []
+
+    @contextmanager
+    def recorder(**options: Any) -> Iterator[None]:  # noqa: ANN401
+        given.append(options)
+        yield
+
+    monkeypatch.setattr("tqdm.tqdm", recorder)
+    for show in (True, False):
+        with progress_bar(3, "steps", show=show):
+            pass
+    assert ["disable" in options for options in given] == [False, True]
+
+
+def test_a_process_without_stderr_is_no_reason_to_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Windows starts some without."""
+    monkeypatch.setattr(sys, "stderr", None)
+    assert list(progress([1, 2], "steps", show=True)) == [1, 2]
