@@ -22,6 +22,7 @@ from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.stiffness import dynamic_stiffness, transmissibility
 from halfdof_ctrl.sweep import sweep
 from halfdof_ctrl.sweepresult import SweepFailure, SweepResult
+from halfdof_ctrl.truncation import TruncatedModel, truncate_modes
 
 __version__ = "0.1.0"
 
@@ -34,6 +35,7 @@ __all__ = [
     "StateFeedback",
     "SweepFailure",
     "SweepResult",
+    "TruncatedModel",
     "bode_plot",
     "crosscheck",
     "descriptor_response",
@@ -58,6 +60,7 @@ __all__ = [
     "sweep_plot",
     "transmissibility",
     "transmissibility_plot",
+    "truncate_modes",
     "write_report",
     "zeros",
 ]

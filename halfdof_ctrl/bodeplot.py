@@ -10,7 +10,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
-from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.axes import (
     CIRCLE,
     AxesArray,
@@ -37,7 +37,7 @@ from halfdof_ctrl.errors import (
     UncertainRankError,
 )
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.response import descriptor_response, frequency_response
+from halfdof_ctrl.response import descriptor_response, frequency_response, has_many_states
 from halfdof_ctrl.statespace import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
@@ -99,12 +99,14 @@ def bode_plot(
     ----------
     sysdata : control.StateSpace or SecondOrderModel
         The curve is `frequency_response` of the state space, for a model that of `mech2ss` of it. Where a
-        model has none (complex, improper, order uncertain) the curve is its descriptor form, and the legend says so.
+        model has none (complex, improper, order uncertain, more than 1000 states of a sparse model) the curve is its
+        descriptor form, and the legend says so.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points (two are two points, not limits); also with `Hz`. By default a
         grid around the poles.
     reference : SecondOrderModel, optional
-        Model whose descriptor form gives the markers, by default `sysdata` if that is a model.
+        Model whose descriptor form gives the markers, by default `sysdata` if that is a model, but not a sparse one
+        with more than 2000 DOFs, where each marker takes its time.
     ax : (2 p, m) array_like of Axes, optional
         Magnitude and phase of each of p outputs in rows, m inputs in columns; (2,) for one input and output.
     dB : bool
@@ -220,12 +222,15 @@ def _curve(
     """Give the curve, what it is, and the model that the markers come from."""
     require_system(sysdata)
     if isinstance(sysdata, SecondOrderModel):
+        if has_many_states(sysdata):
+            return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
             sys = mech2ss(sysdata)
         except tuple(NO_STATE_SPACE) as error:
             kind = f"descriptor form (no state space: {NO_STATE_SPACE[type(error)]})"
             return descriptor_response(sysdata, omega), kind, reference
-        reference = sysdata if reference is None else reference
+        if reference is None and not (sysdata.is_sparse and len(sysdata.dofs) > LARGEST_DENSE_COPY):
+            reference = sysdata
     else:
         sys = sysdata
     curve = frequency_response(sys, omega)

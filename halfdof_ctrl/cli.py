@@ -16,7 +16,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TypeAlias
+from typing import TypeAlias, overload
 
 import control
 import numpy as np
@@ -26,7 +26,7 @@ from halfdof_ctrl.crosscheck import crosscheck
 from halfdof_ctrl.descriptor import pencil_structure
 from halfdof_ctrl.design import StateFeedback, lqr
 from halfdof_ctrl.eigentable import eigenvalue_table
-from halfdof_ctrl.errors import FileFormatError, HalfdofError, ParameterError
+from halfdof_ctrl.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
 from halfdof_ctrl.files import (
     GAIN_ENDINGS,
     TABLE_ENDINGS,
@@ -44,7 +44,13 @@ from halfdof_ctrl.names import listed, motions
 from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
 from halfdof_ctrl.reduction import exact_reduction
 from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
-from halfdof_ctrl.response import DEFAULT_POINTS, default_frequencies, frequency_response
+from halfdof_ctrl.response import (
+    DEFAULT_POINTS,
+    FEW_POINTS,
+    frequency_response,
+    has_many_states,
+    model_frequencies,
+)
 from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.stepplot import MOST_RECOVERED
 from halfdof_ctrl.stiffness import dynamic_stiffness_response, motion_frequencies
@@ -73,10 +79,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show is no reason to stop
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _warnings_on_stderr():
+        with _warnings_on_stderr() as caught:
             without_windows()
             code = command(arguments)
             sys.stdout.flush()
+        if any(issubclass(warning.category, InterruptedResponseWarning) for warning in caught):
+            code = INTERRUPTED  # what was done is written
     except BrokenPipeError:  # who reads our output has seen enough
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that Python's own flush at exit does not complain
         return BROKEN_PIPE
@@ -135,7 +143,8 @@ def _ss(arguments: argparse.Namespace) -> int:
 def _bode(arguments: argparse.Namespace) -> int:
     kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
     model = _model(arguments)
-    omega = _frequencies(lambda: default_frequencies(pencil_structure(model).finite_eigenvalues), arguments)
+    usual = FEW_POINTS if has_many_states(model) else DEFAULT_POINTS
+    omega = _frequencies(lambda: model_frequencies(model), arguments, usual=usual)
     if kind in TABLE_ENDINGS:
         save_response(frequency_response(model, omega), arguments.o)
     else:
@@ -208,7 +217,7 @@ def _check(arguments: argparse.Namespace) -> int:
 def _model(arguments: argparse.Namespace) -> SecondOrderModel:
     """Make the built-in model or load the file, and select its signals."""
     name: str = arguments.model
-    signals: _Signals
+    signals: _Signals | None = None
     if name in BUILT_IN:
         signals = BUILT_IN_SIGNALS[name]
         model = BUILT_IN[name](**_parameters(name, arguments.p))
@@ -220,8 +229,8 @@ def _model(arguments: argparse.Namespace) -> SecondOrderModel:
             msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
             raise FileFormatError(msg, path=name)
         model = load_model(name)
-        signals = model.inputs, model.outputs
-    return model.select(_listed(arguments.inputs, signals[0]), _listed(arguments.outputs, signals[1]))
+    inputs, outputs = signals or (None, None)
+    return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
 
 
 def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]:
@@ -266,26 +275,39 @@ def _number(text: str, what: str) -> float:
         raise ParameterError(msg, parameter=what, value=text) from cause
 
 
-def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]:
+@overload
+def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]: ...
+
+
+@overload
+def _listed(given: Sequence[str] | None, default: None) -> list[str] | None: ...
+
+
+def _listed(given: Sequence[str] | None, default: Sequence[str] | None) -> list[str] | None:
+    """Split lists with commas; None where nothing is given and there is no default."""
     if given is None:
-        return list(default)
+        return None if default is None else list(default)
     return [name.strip() for text in given for name in text.split(",") if name.strip()]
 
 
 def _frequencies(
-    default: Callable[[], np.ndarray], arguments: argparse.Namespace, *, linear: bool = False
+    default: Callable[[], np.ndarray],
+    arguments: argparse.Namespace,
+    *,
+    linear: bool = False,
+    usual: int = DEFAULT_POINTS,
 ) -> np.ndarray | None:
     """Choose the frequencies [rad/s] if any of the limits or their number is given, the others from a default grid."""
     low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
     if low is None and high is None and points is None:
         return None
-    around = default()
+    around = default() if low is None or high is None else np.zeros(0)
     low = around[0] if low is None else low
     high = around[-1] if high is None else high
     if not (math.isfinite(high) and 0.0 <= low < high and (linear or low > 0.0)):
         msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
         raise ParameterError(msg, parameter="--omega-min", value=low)
-    points = DEFAULT_POINTS if points is None else points
+    points = usual if points is None else points
     if not FEWEST_POINTS <= points <= MOST_POINTS:
         msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
         raise ParameterError(msg, parameter="--points", value=points)
@@ -322,12 +344,12 @@ def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
 
 
 @contextmanager
-def _warnings_on_stderr() -> Iterator[None]:
+def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
     """Show each warning once, as a line."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            yield
+            yield caught
         finally:
             for message in dict.fromkeys(str(warning.message) for warning in caught):
                 _say("warning", message)

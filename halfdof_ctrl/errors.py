@@ -234,3 +234,11 @@ class FailedCasesWarning(UserWarning):
 
 class ImportedModelWarning(UserWarning):
     """What a finite-element program wrote is read as it stands, but is probably not what was meant."""
+
+
+class TruncationWarning(UserWarning):
+    """A small model is far from the full one somewhere in the band that matters."""
+
+
+class InterruptedResponseWarning(UserWarning):
+    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""

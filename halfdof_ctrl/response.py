@@ -12,14 +12,29 @@ import numpy.typing as npt
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.descriptor import pencil_structure, require_regular
-from halfdof_ctrl.errors import ComplexModelError, ImproperError, ParameterError, UncertainRankError
+from halfdof_ctrl.errors import (
+    ComplexModelError,
+    ImproperError,
+    ParameterError,
+    SingularLeadingMatrixError,
+    UncertainRankError,
+)
 from halfdof_ctrl.hessenberg import state_space_response
-from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
+from halfdof_ctrl.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.names import control_label, control_labels
+from halfdof_ctrl.reduction import exact_reduction
+from halfdof_ctrl.sparsearrays import as_sparse
+from halfdof_ctrl.sparseresponse import sparse_frequency_response
 from halfdof_ctrl.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.statespace import mech2ss
+from halfdof_ctrl.threads import limited_threads
 
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
+FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
+GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
+NEXT_MODE = 1.2  #: it ends this factor above the last of them
+MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
 MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
 AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
 FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
@@ -29,25 +44,34 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     """Compute the frequency response of the descriptor form.
 
     Equation (1) is solved directly at each frequency, without the reduction, also for complex and
-    improper models.
+    improper models. A sparse model is factorized once a frequency, with a progress bar on a terminal or in a
+    notebook where that takes long.
 
     Parameters
     ----------
     model : SecondOrderModel
     omega : (k,) array_like, optional
-        Frequencies [rad/s], the very points; by default a grid around the finite eigenvalues.
+        Frequencies [rad/s], the very points; by default those of `model_frequencies`.
 
     Returns
     -------
     control.FrequencyResponseData
-        With the model's names.
+        With the model's names. That of a sparse model may be stopped (Ctrl-C): then it holds the frequencies
+        that are done, which are spread over the whole range.
 
     Raises
     ------
     SingularPencilError
         ``det P(s)`` vanishes identically.
     ParameterError
-        Frequencies that are no finite, nonnegative numbers.
+        Frequencies that are no finite, nonnegative numbers; a sparse model for which there are no default ones.
+    ModelSizeError
+        A response of too many inputs and outputs.
+
+    Warns
+    -----
+    InterruptedResponseWarning
+        The user stopped it.
 
     Examples
     --------
@@ -55,11 +79,13 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     >>> descriptor_response(spring, [1.0, 2.0]).magnitude.tolist()
     [0.25, 0.25]
     """
-    require_regular(model)
-    if omega is None:
-        omega = default_frequencies(pencil_structure(model).finite_eigenvalues)
-    frequencies = checked_frequencies(omega)
-    values = model(1j * frequencies, squeeze=False)
+    if model.is_sparse:
+        frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
+        values, frequencies = sparse_frequency_response(model, frequencies)
+    else:
+        require_regular(model)
+        frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
+        values = model(1j * frequencies, squeeze=False)
     name = None if model.name is None else control_label(model.name)
     return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
 
@@ -72,8 +98,8 @@ def frequency_response(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        A model is reduced first; where no state space exists (complex, improper, order
-        uncertain) its descriptor form is evaluated.
+        A model is reduced first; where no state space exists (complex, improper, order uncertain), and where a
+        sparse model has more than 1000 states, its descriptor form is evaluated.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points; by default a grid around the poles.
 
@@ -99,6 +125,8 @@ def frequency_response(
     [(0.5+0j)]
     """
     if isinstance(sysdata, SecondOrderModel):
+        if has_many_states(sysdata):
+            return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
         except (ComplexModelError, ImproperError, UncertainRankError):
@@ -112,6 +140,54 @@ def frequency_response(
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
     values = state_space_response(A, B, C, D, points)
     return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
+
+
+def has_many_states(model: SecondOrderModel) -> bool:
+    """Tell whether a sparse model has so many states that its descriptor form is evaluated sooner than A, B, C, D."""
+    if not model.is_sparse:
+        return False
+    inertial, half = null_column_kinds(model.M, model.C)
+    return bool(2 * np.count_nonzero(inertial) + np.count_nonzero(half) > MOST_STATES)
+
+
+def model_frequencies(model: SecondOrderModel) -> FloatArray:
+    """Choose frequencies [rad/s] for a model.
+
+    Those of `default_frequencies` for its finite eigenvalues; for a sparse model with many states 200 frequencies, from
+    a tenth of its lowest mode to its twelfth.
+
+    Raises
+    ------
+    ParameterError
+        A sparse model with many states that has no real modes: complex, unsymmetric, or M or K not semidefinite.
+    """
+    if not model.is_sparse:
+        return default_frequencies(pencil_structure(model).finite_eigenvalues)
+    if not has_many_states(model):
+        try:
+            poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
+            return default_frequencies(poles[np.abs(poles) > rounding])
+        except (ComplexModelError, SingularLeadingMatrixError, UncertainRankError):
+            pass
+    omega = _lowest_frequencies(model)
+    return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
+
+
+def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
+    """Give the lowest natural frequencies [rad/s] that are not zero, without damping."""
+    K, M = as_sparse(model.K), as_sparse(model.M)
+    omega = np.zeros(0)
+    if not (model.is_complex or is_unsymmetric(K) or is_unsymmetric(M)):
+        with limited_threads(1):
+            stiffness = ShiftedStiffness.factorized(K, M)
+            if stiffness is not None:
+                omega = lowest_modes(stiffness, GRID_MODES).omega
+    moving = np.asarray(omega[omega > AT_ORIGIN * omega.max(initial=0.0)])
+    if moving.size == 0:
+        require_regular(model)
+        msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."
+        raise ParameterError(msg, parameter="omega", value=None)
+    return moving
 
 
 def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> FloatArray:

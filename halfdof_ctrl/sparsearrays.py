@@ -5,6 +5,7 @@ kind, its inputs and outputs included.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, cast
 
 import numpy as np
@@ -216,6 +217,26 @@ def times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
 def transposed_times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
     """Multiply the transpose of a sparse matrix and a dense matrix."""
     return np.asarray(matrix.T @ dense)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transposed:
+    """The transpose of a sparse matrix with few filled rows, ready to be multiplied."""
+
+    rows: IndexArray | None  #: filled rows of the matrix, None for all
+    part: csr_array  #: transpose of these
+
+    @classmethod
+    def of(cls, matrix: SparseMatrix) -> "Transposed":
+        """Prepare the transpose of a matrix."""
+        rows = np.unique(matrix.indices).astype(np.intp)
+        if rows.size > matrix.shape[0] // 2:
+            return cls(None, csr_array(matrix.T))
+        return cls(rows, csr_array(matrix.T[:, rows]))
+
+    def times(self, dense: Matrix) -> Matrix:
+        """Multiply with a dense matrix."""
+        return np.asarray(self.part @ (dense if self.rows is None else dense[self.rows]))
 
 
 def column_of_entries(matrix: SparseMatrix) -> IndexArray:

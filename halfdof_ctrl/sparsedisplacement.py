@@ -22,14 +22,15 @@ from halfdof_ctrl.signals import Signal, absorbed, trimmed
 from halfdof_ctrl.sparsearrays import (
     IndexArray,
     SparseMatrix,
+    Transposed,
     as_sparse,
     joined_sparse,
     sparse_unit,
     times,
-    transposed_times,
 )
 from halfdof_ctrl.sparselu import WIDTH, SparseLU, largest_of_columns
 from halfdof_ctrl.sparsepartition import HALF, INERTIAL, STATIC, SparsePartition
+from halfdof_ctrl.threads import limited_threads
 
 MOST_ENTRIES = 2**26  #: of A, B, C or D of a state space, and of equation (4) for all DOFs, dense (512 MB)
 ROUNDING = 32 * float(np.finfo(float).eps)  #: times n, at most 64: a coefficient of u' below this part is rounding
@@ -45,6 +46,7 @@ class SparseEquation:
     partition: SparsePartition
     states: SparseMatrix  #: (n, N) [K T_i, K T_c, C T_i], to be subtracted
     forces: tuple[SparseMatrix, ...]  #: (n, m) B, Bv, Ba, without zeros at the end, but at least one
+    transposes: tuple[Transposed, ...]  #: of `states` and `forces`
 
     @classmethod
     def of(cls, model: SecondOrderModel, partition: SparsePartition, rows: FloatArray) -> "SparseEquation":
@@ -59,7 +61,8 @@ class SparseEquation:
             csc_array((part.data * rows[part.indices], part.indices, part.indptr), shape=part.shape)
             for part in (states, *forces)
         ]
-        return cls(partition=partition, states=scaled[0], forces=tuple(scaled[1:]))
+        transposes = tuple([Transposed.of(part) for part in scaled])
+        return cls(partition=partition, states=scaled[0], forces=tuple(scaled[1:]), transposes=transposes)
 
 
 def require_room(rows: int, columns: int, what: str, remedy: str) -> None:
@@ -140,6 +143,7 @@ class SparseDisplacement:
         """Give U_0, zeros if there is none."""
         return self.whole().direct(inputs)
 
+    @limited_threads(1)
     def inverse_rows(self) -> FloatArray:
         """Give the (n_i + n_c, n) rows of W^-1 for p''_i and p'_c, gamma and alpha.
 
@@ -202,6 +206,7 @@ class SparseDisplacement:
             slopes.append(forward_slope(slopes[-1], time))
         return [self.motion_at(x, slopes, derivative) for derivative in range(2)]
 
+    @limited_threads(1)
     def motion_at(self, x: FloatArray, inputs: list[FloatArray], derivative: int) -> FloatArray:
         """Give q or q' (derivative 0 or 1) of all DOFs, (n, k), for states and for the inputs and their derivatives."""
         part, forces = self.equation.partition, self.equation.forces
@@ -225,6 +230,7 @@ class SparseDisplacement:
                 advance(right.shape[1])
         return q
 
+    @limited_threads(1)
     def _combined(self, weights: SparseMatrix) -> tuple[Signal, Signal]:
         """Give ``weights q``, and what the rounding errors of its coefficients are relative to."""
         part, equation = self.equation.partition, self.equation
@@ -273,8 +279,8 @@ class SparseDisplacement:
                     span = slice(start, start + WIDTH)
                     z = leading.solve_transposed(static[span].T.toarray(order="F"))
                     largest = largest_of_columns(z)
-                    for part, product, size, scale in zip(columns, products, sizes, scales, strict=True):
-                        product[span], size[span] = transposed_times(part, z).T, largest[:, None] * scale
+                    for turned, product, size, scale in zip(equation.transposes, products, sizes, scales, strict=True):
+                        product[span], size[span] = turned.times(z).T, largest[:, None] * scale
                     advance(z.shape[1])
         else:
             weight = times(csc_array(abs(static)), leading.columns[:, None])

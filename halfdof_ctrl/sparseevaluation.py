@@ -26,11 +26,12 @@ from halfdof_ctrl.sparsearrays import (
     largest_by_row_and_column,
     times,
 )
+from halfdof_ctrl.threads import limited_threads
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 Pivoting: TypeAlias = tuple[Literal["MMD_AT_PLUS_A", "COLAMD"], float]  #: order, least pivot over the column's largest
 
-WIDTH = 3  #: right-hand sides worked at a time; more of them wake the threads of BLAS, to no gain in such small blocks
+WIDTH = 8  #: right-hand sides worked at a time
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
 REFINED = 64 * np.finfo(float).eps  #: componentwise backward error above which a solution is corrected once
 UNSAFE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
@@ -38,6 +39,7 @@ SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal
 PIVOTINGS: tuple[Pivoting, ...] = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))
 
 
+@limited_threads(1)
 def sparse_transfer(
     P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray
 ) -> ComplexArray:
@@ -98,6 +100,7 @@ class SparseTransfer:
         pencil = SparsePencil.on_one_pattern(square)
         self.pivotings = PIVOTINGS if pencil.is_nearly_symmetric else PIVOTINGS[-1:]
         self.pencils = [pencil] * len(self.pivotings)  #: in the order found for each way of pivoting
+        self.growth = 0.0  #: of a random solution at the first point, relative to the scaled P(s)
 
     def at(self, s: complex) -> ComplexArray:
         """Evaluate at one point [rad/s]: (p, m)."""
@@ -108,6 +111,7 @@ class SparseTransfer:
                 try:
                     motion, backward_error = self._times_solution(F, B, s, way)
                 except RuntimeError:  # exactly singular
+                    self.growth = np.inf
                     break
                 if backward_error <= UNSAFE or way == len(self.pivotings) - 1:
                     value = np.asarray(motion + D.toarray())
@@ -133,6 +137,7 @@ class SparseTransfer:
         if not pencil.is_ordered:
             order = np.argsort(factors.lu.perm_c)
             self.pencils[way] = pencil.in_order(None if ordering == "COLAMD" else order, order)
+            self.growth = max(self.growth, factors.growth())
         return factors
 
 
@@ -246,6 +251,12 @@ class PointFactors:
         back = np.empty_like(solution)
         back[columns] = solution
         return back, backward_error
+
+    def growth(self) -> float:
+        """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
+        right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
+        size = float(np.abs(self.lu.solve(right)).max())
+        return size if np.isfinite(size) else np.inf
 
     def _residual(self, right: ComplexArray, solution: ComplexArray) -> tuple[ComplexArray, float]:
         residual = right - times(self.matrix, solution)

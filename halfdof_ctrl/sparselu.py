@@ -7,7 +7,8 @@ solution loses tells: where it is more than rounding, solutions are corrected on
 are chosen more strictly, in the end by columns with partial pivoting.
 
 What is factorized is the transpose, because the reduction solves with it, and SuperLU works many right-hand sides
-side by side for the matrix that it was given, but not for the transpose of that.
+side by side for the matrix that it was given, but not for the transpose of that. Its small dense blocks gain nothing
+from several threads and may lose all by waiting for them: call it within ``threads.limited_threads(1)``.
 """
 
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from halfdof_ctrl.sparsearrays import (
 )
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
-WIDTH = 3  #: right-hand sides worked at a time; more of them wake the threads of BLAS, to no gain in such small blocks
+WIDTH = 8  #: right-hand sides worked at a time
 REFINED = 2.0**-46  #: componentwise backward error of the test solution above which solutions are corrected once
 UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
 SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one

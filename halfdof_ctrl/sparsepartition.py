@@ -77,30 +77,41 @@ class SparsePartition:
         """Number of coordinates with neither."""
         return int(np.count_nonzero(self.kinds == STATIC))
 
-    @cached_property
+    @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of p: DOFs, or mix0, mix1, ... for combinations."""
-        order = self.order.tolist()
-        if self.columns is None:
-            return tuple([self.dofs[place] for place in order])
-        single = (np.diff(self.columns.indptr) == 1) & (self.columns.max(axis=0).toarray().ravel() == 1.0)
-        selected = [int(self.columns.indices[self.columns.indptr[j]]) if single[j] else None for j in order]
-        return mixture_names(selected, self.dofs)
+        return self._names(self.order) if self.columns is None else self._mixed_names
 
     @property
     def inertial(self) -> tuple[str, ...]:
         """Names of the coordinates with mass, p_i."""
-        return self.coordinates[: self.n_inertial]
+        return self._some(0, self.n_inertial)
 
     @property
     def half(self) -> tuple[str, ...]:
         """Names of the damped coordinates without mass, p_c."""
-        return self.coordinates[self.n_inertial : self.n_inertial + self.n_half]
+        return self._some(self.n_inertial, self.n_inertial + self.n_half)
 
     @property
     def static(self) -> tuple[str, ...]:
         """Names of the coordinates with neither, p_k."""
-        return self.coordinates[self.n_inertial + self.n_half :]
+        return self._some(self.n_inertial + self.n_half, len(self.dofs))
+
+    def _some(self, first: int, stop: int) -> tuple[str, ...]:
+        """Give names without making those of all coordinates, where they are DOFs."""
+        if self.columns is not None:
+            return self._mixed_names[first:stop]
+        return self._names(self.order[first:stop])
+
+    def _names(self, places: IndexArray) -> tuple[str, ...]:
+        return tuple([self.dofs[place] for place in places.tolist()])
+
+    @cached_property
+    def _mixed_names(self) -> tuple[str, ...]:
+        columns = as_sparse(sparse_unit(len(self.dofs))) if self.columns is None else self.columns
+        single = (np.diff(columns.indptr) == 1) & (columns.max(axis=0).toarray().ravel() == 1.0)
+        selected = [int(columns.indices[columns.indptr[j]]) if single[j] else None for j in self.order.tolist()]
+        return mixture_names(selected, self.dofs)
 
     @property
     def states(self) -> tuple[str, ...]:

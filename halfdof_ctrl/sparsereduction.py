@@ -22,10 +22,11 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.progress import progress_bar
 from halfdof_ctrl.signals import absorbed
-from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse, column_of_entries, transposed_times
+from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse, column_of_entries
 from halfdof_ctrl.sparsedisplacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
 from halfdof_ctrl.sparselu import SparseLU, largest_of_columns
 from halfdof_ctrl.sparsepartition import SparsePartition, select_sparse_columns, sparse_bases
+from halfdof_ctrl.threads import limited_threads
 
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 
@@ -42,6 +43,7 @@ class SparseReduction:
     shift: tuple[FloatArray, ...]  #: E_0, E_1 of equation (5)
 
 
+@limited_threads(1)
 def sparse_reduction(
     model: SecondOrderModel, tol: float | None, method: Literal["selection", "orthogonal"] | None
 ) -> SparseReduction:
@@ -64,9 +66,9 @@ def sparse_reduction(
     with progress_bar(moving, "solutions") as advance:
         for block, z in inverse_rows(leading, partition.order[:moving]):
             rows = np.where(block < n_i, moving + block, block)
-            A[rows] = -transposed_times(equation.states, z).T
-            for force, part in zip(equation.forces, driven, strict=True):
-                part[rows] = transposed_times(force, z).T
+            A[rows] = -equation.transposes[0].times(z).T
+            for force, part in zip(equation.transposes[1:], driven, strict=True):
+                part[rows] = force.times(z).T
             sizes[block] = largest_of_columns(z)
             advance(block.size)
     A += 0.0  # leaves no negative zeros to be printed

@@ -17,6 +17,7 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse
 from halfdof_ctrl.sparseevaluation import PIVOTINGS, PointFactors, SparsePencil
+from halfdof_ctrl.threads import limited_threads
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where P(s) is looked at, in units of the time scale
 SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero
@@ -25,6 +26,7 @@ STEPS = 4  #: of inverse iteration
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 
 
+@limited_threads(1)
 def require_regular_sparse(model: SecondOrderModel) -> None:
     """Refuse a singular pencil of a sparse model, naming the DOFs that nothing holds.
 
