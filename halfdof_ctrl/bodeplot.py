@@ -34,6 +34,7 @@ from halfdof_ctrl.errors import (
     HalfdofError,
     ImproperError,
     ParameterError,
+    SingularLeadingMatrixError,
     UncertainRankError,
 )
 from halfdof_ctrl.model import SecondOrderModel
@@ -53,6 +54,7 @@ SPIKE = 1e5  #: a peak higher than this times that range is cut
 NO_STATE_SPACE: dict[type[HalfdofError], str] = {
     ComplexModelError: "model is complex",
     ImproperError: "improper",
+    SingularLeadingMatrixError: "W is singular",
     UncertainRankError: "order uncertain",
 }
 

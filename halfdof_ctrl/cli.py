@@ -115,14 +115,16 @@ def _info(arguments: argparse.Namespace) -> int:
     model = _model(arguments)
     print(model)
     if len(model.dofs) > LARGEST_PENCIL:
-        print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
-        return DONE
-    structure = pencil_structure(model)
-    kind = "regular" if structure.is_regular else "SINGULAR"
-    print(
-        f"Pencil: {kind}, {structure.finite_eigenvalues.size} finite and {structure.n_infinite} infinite eigenvalues, "
-        f"index {structure.index}"
-    )
+        if not model.is_sparse:
+            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+            return DONE
+        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
+        model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
+    else:
+        structure = pencil_structure(model)
+        kind = "regular" if structure.is_regular else "SINGULAR"
+        finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
+        print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
     try:
         print(exact_reduction(model))
     except HalfdofError as refusal:

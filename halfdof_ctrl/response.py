@@ -30,6 +30,7 @@ from halfdof_ctrl.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.statespace import mech2ss
 from halfdof_ctrl.threads import limited_threads
 
+NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
@@ -98,8 +99,8 @@ def frequency_response(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        A model is reduced first; where no state space exists (complex, improper, order uncertain), and where a
-        sparse model has more than 1000 states, its descriptor form is evaluated.
+        A model is reduced first; where no state space exists (complex, improper, order uncertain), and where a sparse
+        model has more than 1000 states, its descriptor form is evaluated.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points; by default a grid around the poles.
 
@@ -129,7 +130,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
-        except (ComplexModelError, ImproperError, UncertainRankError):
+        except NO_STATE_SPACE:
             return descriptor_response(sysdata, omega)
     else:
         sys = sysdata
@@ -167,7 +168,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         try:
             poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
             return default_frequencies(poles[np.abs(poles) > rounding])
-        except (ComplexModelError, SingularLeadingMatrixError, UncertainRankError):
+        except NO_STATE_SPACE:
             pass
     omega = _lowest_frequencies(model)
     return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)

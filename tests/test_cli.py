@@ -363,7 +363,7 @@ def test_info_takes_a_folder_and_no_time_for_large_pencils(
     Path("exported").mkdir()
     Path("exported/K.mtx").write_text(matrix_market(K))
     assert main(["info", "exported"]) == 0
-    assert "Pencil and reduction: not shown above 2 DOFs." in capsys.readouterr().out
+    assert "Pencil: not shown above 2 DOFs." in capsys.readouterr().out
 
 
 def test_other_commands_take_exported_files(capsys: pytest.CaptureFixture[str]) -> None:
