@@ -120,7 +120,7 @@ def is_complex(matrix: Matrix) -> bool:
 
 def is_zero(matrix: Matrix) -> bool:
     """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
-    if issparse(matrix):
+    if type(matrix) is not np.ndarray and issparse(matrix):
         return bool(matrix.size == 0)  # of stored entries, none of which is zero
     shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)
     return shared or not matrix.any()

@@ -1,13 +1,14 @@
 """Finite-element models of any size with few masses, for tests and benchmarks: spring grids and space frames."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array, kron
 
-from halfdof_ctrl import SecondOrderModel, mechss
+if TYPE_CHECKING:  # other tools are measured with these models, where the package is not installed
+    from halfdof_ctrl import SecondOrderModel
 
 YOUNG, SHEAR = 2.1e11, 8.1e10  #: steel [Pa]
 AREA, BENDING, TORSION = 1e-3, 1e-6, 2e-6  #: section of a beam [m^2, m^4, m^4]
@@ -29,8 +30,10 @@ class Structure:
         """Number of DOFs."""
         return int(self.K.shape[0])
 
-    def model(self, **options: Any) -> SecondOrderModel:  # noqa: ANN401  # those of mechss
+    def model(self, **options: Any) -> "SecondOrderModel":  # noqa: ANN401  # those of mechss
         """Make the sparse model."""
+        from halfdof_ctrl import mechss  # noqa: PLC0415
+
         return mechss(self.M, self.C, self.K, **options)
 
 

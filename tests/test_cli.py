@@ -11,6 +11,8 @@ import control
 import numpy as np
 import pytest
 from fe_files import C, K, M, abaqus, matrix_market
+from fe_models import spring_grid
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
 from halfdof_ctrl.cli import main
@@ -18,6 +20,7 @@ from halfdof_ctrl.crosscheck import CrossCheck
 from halfdof_ctrl.design import lqr
 from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files import load_system, save_model
+from halfdof_ctrl.sparseevaluation import SparseTransfer
 
 COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
@@ -372,3 +375,62 @@ def test_other_commands_take_exported_files(capsys: pytest.CaptureFixture[str]) 
         Path(f"job_{word}1.mtx").write_text(abaqus(matrix))
     assert main(["check", "job_STIF1.mtx", "--inputs", "F_n3_u1", "--outputs", "n1_u1,n3_u1"]) == 0
     assert "Cross-check passed" in capsys.readouterr().out
+
+
+def net(masses: int, ending: str = "npz") -> str:
+    """Save a sparse net of springs of 26 x 23 nodes, with damping where there is mass."""
+    structure = spring_grid(26, 23, masses)
+    damping = csc_array(1e-4 * structure.K + structure.M) if masses > 100 else csc_array(3.0 * structure.M)
+    save_model(mechss(structure.M, damping, structure.K, name="net"), f"net.{ending}")
+    return f"net.{ending}"
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_sparse_models_with_few_masses_go_all_the_way(ending: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """State space, step response and reduction of 598 DOFs with three masses."""
+    path = net(3, ending)
+    signals = ["--inputs", "F_q100", "--outputs", "q100,q7"]
+    assert main(["ss", path, *signals, "-o", "net_ss.npz"]) == 0
+    assert load_system("net_ss.npz").nstates == 6
+    assert main(["step", path, *signals, "-o", "step.csv"]) == 0
+    assert table("step.csv")[0] == ["t [s]", "q100/F_q100", "q7/F_q100"]
+    assert main(["info", path]) == 0
+    printed = capsys.readouterr().out
+    assert "Pencil: not shown above 500 DOFs." in printed
+    assert "ExactReduction by selection: 6 states" in printed
+
+
+def test_sparse_models_with_many_states_get_a_bode_diagram_without_a_state_space() -> None:
+    """1794 states: the descriptor form at the frequencies asked for, or at a few by default."""
+    path = net(598)
+    command = ["bode", path, "--inputs", "F_q100", "--outputs", "q7"]
+    limits = ["--omega-min", "1", "--omega-max", "20", "--points", "5"]
+    assert main([*command, *limits, "-o", "five.csv"]) == 0
+    rows = table("five.csv")
+    assert len(rows) == 6
+    model = spring_grid(26, 23, 598)
+    s = 20.0j
+    P = (model.K * (1.0 + 1e-4 * s) + model.M * (s + s**2)).toarray()
+    desired = np.linalg.solve(P, np.eye(598)[:, 100])[7]
+    np.testing.assert_allclose([float(text) for text in rows[-1][2:4]], [desired.real, desired.imag], rtol=1e-8)
+    assert main([*command, "-o", "default.csv"]) == 0
+    assert len(table("default.csv")) == 201
+
+
+def test_an_interrupted_bode_diagram_writes_what_is_done(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The exit code is that of an interrupt, the file is whole."""
+    at, calls = SparseTransfer.at, []
+
+    def evaluate(transfer: SparseTransfer, s: complex) -> np.ndarray:
+        calls.append(s)
+        if len(calls) > 3:
+            raise KeyboardInterrupt
+        return at(transfer, s)
+
+    monkeypatch.setattr(SparseTransfer, "at", evaluate)
+    command = ["bode", net(598), "--inputs", "F_q100", "--outputs", "q7", "--omega-min", "1", "--omega-max", "20"]
+    assert main([*command, "-o", "part.csv"]) == 130
+    assert len(table("part.csv")) == 4
+    assert "warning: Interrupted after 3 of 200 frequencies" in capsys.readouterr().err

@@ -13,6 +13,7 @@ import numpy.typing as npt
 import pytest
 import scipy.io
 import scipy.sparse
+from fe_models import spring_grid
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -372,3 +373,20 @@ def test_a_damaged_file_loads_or_is_refused_by_name(
         refusal = str(caught)
     assert refusal.startswith(str(path))
     assert "\n" not in refusal
+
+
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_sparse_models_stay_sparse_in_files(ending: str, tmp_path: Path) -> None:
+    """All matrices and names come back, with complex stiffness and prescribed motion too."""
+    structure = spring_grid(9, 7, 5, dampers=2)
+    model = mechss(structure.M, structure.C, structure.K * (1.0 + 0.05j), name="net").select(
+        ["F_q3"], ["q5_ddot", "q6"]
+    )
+    for saved in (model, model.prescribe_motion("q11", outputs=["R_q11", "q5_ddot"])):
+        save_model(saved, tmp_path / f"net.{ending}")
+        loaded = load_model(tmp_path / f"net.{ending}")
+        assert loaded.is_sparse
+        for letter in LETTERS:
+            np.testing.assert_array_equal(getattr(loaded, letter).toarray(), getattr(saved, letter).toarray())
+        for key in ("dofs", "inputs", "outputs", "prescribed", "name"):
+            assert getattr(loaded, key) == getattr(saved, key)
