@@ -28,6 +28,7 @@ from halfdof_ctrl.evaluation import quadratic_rounding
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
+from halfdof_ctrl.secondopinion import second_opinion
 from halfdof_ctrl.spectrum import ROUNDING, balanced_states, eigenvalues_and_rounding
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
@@ -60,6 +61,8 @@ class CrossCheck:
     step_worst: str  #: where: output, input, t
     step_horizon: float  #: how far the step response was followed [s]
     evaluation_error: float  #: of python-control's sys(s) against a direct solve with the same A, B, C, D
+    index: int  #: of the descriptor form, pencil (8)
+    slycot: str  #: what slycot's ag08bd counts, where it is installed; it never decides
 
     @property
     def passed(self) -> bool:
@@ -77,7 +80,7 @@ class CrossCheck:
 
     def __repr__(self) -> str:
         """Print as a small table."""
-        count = f"{self.n_finite} finite, {self.n_infinite} infinite"
+        count = f"{self.n_finite} finite, {self.n_infinite} infinite, index {self.index}"
         rows = [
             ("states", f"{self.order}", count, self.order == self.n_finite),
             (
@@ -95,6 +98,7 @@ class CrossCheck:
             f"{'pointwise':10}{self.max_pointwise_error:>10.1e}  {'(info)':8}  transfer, relative to each value"
         )
         lines.append(f"{'sys(s)':10}{self.evaluation_error:>10.1e}  {'(info)':8}  python-control's own evaluation")
+        lines.append(f"{'slycot':10}{'':>10}  {'(info)':8}  {self.slycot}")
         return "\n".join(["Cross-check passed" if self.passed else "Cross-check FAILED", *lines])
 
 
@@ -170,6 +174,8 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
         transfer_worst=transfer.worst,
         max_pointwise_error=transfer.pointwise,
         evaluation_error=transfer.evaluation,
+        index=structure.index,
+        slycot=second_opinion(model),
         max_pole_error=pole_error,
         pole_worst=pole_worst,
         max_step_error=step_error,

@@ -200,7 +200,15 @@ def test_verdict_prints_as_a_table() -> None:
     text = repr(crosscheck(hydromount(), mech2ss(hydromount())))
     lines = text.splitlines()
     assert lines[0] == "Cross-check passed"
-    assert [line.split()[0] for line in lines[2:]] == ["states", "transfer", "poles", "step", "pointwise", "sys(s)"]
+    assert [line.split()[0] for line in lines[2:]] == [
+        "states",
+        "transfer",
+        "poles",
+        "step",
+        "pointwise",
+        "sys(s)",
+        "slycot",
+    ]
     assert "4 finite, 2 infinite" in text
     assert max(map(len, lines)) < 100
 
