@@ -5,10 +5,22 @@ from collections.abc import Callable
 import control
 import numpy as np
 import pytest
+from benchmark_circuits import hinged_beam, rotor_in_rigid_bearing, two_track_mount
+from benchmark_mechanisms import gear_train, seven_body_mechanism
+from benchmark_problems import mobile_manipulator
 from hypothesis import given, settings
 from structures import Structure, assembly, damped_structures, null_columns, structures
 
-from halfdof_ctrl import CrossCheck, SecondOrderModel, crosscheck, exact_reduction, hydromount, mech2ss, mechss
+from halfdof_ctrl import (
+    CrossCheck,
+    SecondOrderModel,
+    crosscheck,
+    exact_reduction,
+    hydromount,
+    mech2ss,
+    mechss,
+    pencil_structure,
+)
 from halfdof_ctrl.errors import (
     ComplexModelError,
     HalfdofError,
@@ -18,7 +30,7 @@ from halfdof_ctrl.errors import (
 )
 
 FEWER = max(10, settings().max_examples // 5)  # each example integrates step responses of all inputs
-CHANGE = 1e-6  # issue 2: a broken entry must be found
+CHANGE = 1e-6  # a broken entry must be found
 
 OUTPUTS: dict[str, list[str]] = {
     "displacements": ["y", "y1", "y2"],
@@ -188,7 +200,15 @@ def test_verdict_prints_as_a_table() -> None:
     text = repr(crosscheck(hydromount(), mech2ss(hydromount())))
     lines = text.splitlines()
     assert lines[0] == "Cross-check passed"
-    assert [line.split()[0] for line in lines[2:]] == ["states", "transfer", "poles", "step", "pointwise", "sys(s)"]
+    assert [line.split()[0] for line in lines[2:]] == [
+        "states",
+        "transfer",
+        "poles",
+        "step",
+        "pointwise",
+        "sys(s)",
+        "slycot",
+    ]
     assert "4 finite, 2 infinite" in text
     assert max(map(len, lines)) < 100
 
@@ -275,3 +295,29 @@ def test_improper_model_has_nothing_to_compare() -> None:
     with pytest.raises(ImproperError, match="q0_dot from F_q0"):
         mech2ss(model)
     assert not crosscheck(model, control.ss([], [], [], [[0.0]])).passed
+
+
+HELD = [mobile_manipulator, seven_body_mechanism, two_track_mount, rotor_in_rigid_bearing, hinged_beam, gear_train]
+
+
+@pytest.mark.parametrize("problem", HELD, ids=lambda problem: problem.__name__)
+def test_constrained_models_raise_no_false_alarm(problem: Callable[[], SecondOrderModel]) -> None:
+    """Index 2 and 3: channels of DOFs that constraints hold are zero here and rounding there."""
+    model = problem()
+    improper = {output for _, output, _ in pencil_structure(model).improper_pairs}
+    proper = [output for output in model.outputs if output not in improper]
+    model = model.select(outputs=proper or model.outputs[:1])
+    check = crosscheck(model, mech2ss(model))
+    assert check.passed, check
+
+
+@pytest.mark.parametrize("letter", ["A", "B", "C", "D"])
+def test_wrong_systems_of_constrained_models_fail(letter: str) -> None:
+    """A rod between two masses, one entry off by 1e-6."""
+    M, K = np.diag([2.0, 1, 0]), np.array([[30.0, 0, 1], [0, 60, -1], [1, -1, 0]])
+    model = mechss(M, None, K, dofs=["a", "b", "f"]).select("F_a", ["a", "f"])
+    sys = mech2ss(model)
+    matrices = {name: np.array(getattr(sys, name)) for name in "ABCD"}
+    assert crosscheck(model, control.ss(*matrices.values())).passed
+    matrices[letter][-1, 0] += 1e-6 * max(1.0, abs(matrices[letter][-1, 0]))
+    assert not crosscheck(model, control.ss(*matrices.values())).passed
