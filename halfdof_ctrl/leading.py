@@ -5,18 +5,30 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-from scipy.linalg.lapack import dgecon, dgetrf, dgetrs, dlange
+from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
 
 from halfdof_ctrl.arrays import FloatArray
-from halfdof_ctrl.scaling import equilibrating_factors
+from halfdof_ctrl.scaling import evening_logs
 
-PLAINLY_REGULAR = 1e-6  #: W with this reciprocal condition number is nonsingular in any units
 SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
+FEWEST = 256  #: n in that bound at least
+PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number as it stands is not scaled ...
+PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
+SMALL = 60  #: DOFs that are few
+MOST_STEPS = 16  #: of the iteration for the best scaling
+LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
+GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class LeadingMatrix:
-    """W of equation (2), factorized; equilibrated by powers of two where its condition asks for it."""
+    """W of equation (2), factorized; scaled by powers of two where its condition asks for it.
+
+    How well W is conditioned must not depend on the units of DOFs, equations and time, so what counts is the least
+    condition number that scaled rows and columns can have. It is the spectral radius of ``|W^-1| |W|`` (F. L. Bauer,
+    Optimally scaled matrices, 1963), and says how near a singular matrix is: as long as no entry of W changes by more
+    than this part of itself, W stays regular.
+    """
 
     factors: FloatArray  #: (n, n) L and U
     pivots: npt.NDArray[np.int32]
@@ -27,23 +39,58 @@ class LeadingMatrix:
 
     @classmethod
     def factorized(cls, W: FloatArray) -> "LeadingMatrix":
-        """Factorize and estimate the condition; equilibrate first where that might matter.
+        """Factorize and estimate the condition; scale first where that might matter.
 
-        The equilibrated matrix is conditioned at least about as well (A. van der Sluis, 1969), so a W that is well
-        conditioned as it stands needs no second look.
+        A W that is well conditioned as it stands is so in the best units too. Otherwise it is scaled by the means
+        of the logarithms of its entries, which gives the same matrix whatever the units were, and by the best
+        scaling after that if its condition still asks for it. So `rcond` is the same in any units up to what powers
+        of two and the estimate leave, a factor of about four, or large enough in all of them.
         """
+        enough = PLAINLY_REGULAR_IF_SMALL if len(W) <= SMALL else PLAINLY_REGULAR
         factors, pivots, rcond = _lu_and_rcond(W)
-        if rcond >= PLAINLY_REGULAR:
+        if rcond >= enough:
             return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
-        rows, columns = equilibrating_factors(W)
+        rows, columns = [np.exp2(np.round(logs)) for logs in evening_logs(W)]
+        leading = cls._scaled(W, rows, columns)
+        if leading.rcond == 0.0 or leading.rcond >= enough:
+            return leading
+        better = cls._scaled(W, *leading._best_scaling())
+        return better if better.rcond > leading.rcond else leading
+
+    @classmethod
+    def _scaled(cls, W: FloatArray, rows: FloatArray, columns: FloatArray) -> "LeadingMatrix":
         matrix = W * rows[:, None] * columns
         factors, pivots, rcond = _lu_and_rcond(matrix)
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
 
+    def _best_scaling(self) -> tuple[FloatArray, FloatArray]:
+        """Give powers of two near the factors with which W has its least 1-norm condition number.
+
+        The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
+        any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
+        """
+        if self.equilibrated is None or self.rows is None or self.columns is None:
+            return np.ones(len(self.factors)), np.ones(len(self.factors))
+        size, inverse = np.abs(self.equilibrated), np.abs(dgetri(self.factors, self.pivots)[0])
+        u, least = np.ones(len(size)), np.inf
+        for _ in range(MOST_STEPS):
+            across = u @ size
+            following = across @ inverse
+            largest = float((following / u).max())
+            if not largest < GAIN * least:
+                break
+            best, least = (u, 1.0 / across), largest
+            u = np.maximum(following / following.max(), LEAST_FACTOR)
+        rows, columns = [np.exp2(np.round(np.log2(factors))) for factors in best]
+        return self.rows * rows, self.columns * columns
+
     @property
     def is_singular(self) -> bool:
-        """Whether W is singular to working precision: rcond below n eps."""
-        return self.rcond < len(self.factors) * SINGULAR
+        """Whether W is singular to working precision: rcond below n eps, or 256 eps.
+
+        Columns of W that combine DOFs are rounded themselves, which even a small W may show.
+        """
+        return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
 
     def singular_values(self) -> FloatArray:
         """Give the singular values of the matrix that was factorized."""

@@ -25,7 +25,7 @@ from halfdof_ctrl.arrays import FloatArray, Matrix, read_only, unit_matrix
 from halfdof_ctrl.errors import NearlyMasslessWarning, callers_level
 from halfdof_ctrl.model import SecondOrderModel, null_column_kinds
 from halfdof_ctrl.names import listed, motion_names
-from halfdof_ctrl.scaling import equilibrating_factors, gap_threshold, logarithmic_scaling
+from halfdof_ctrl.scaling import gap_threshold, levelling_factors, logarithmic_scaling, time_log, unit_free_factors
 
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 
@@ -187,14 +187,20 @@ def _selection(massive: tuple[bool, ...], damped: tuple[bool, ...], dofs: tuple[
 def mass_ratios(model: SecondOrderModel) -> FloatArray:
     """Give each DOF's mass relative to the largest, free of units.
 
-    At the slowest DOF's own frequency g the rows and columns of ``|K| + g |C| + g^2 |M|`` are equilibrated; the
-    ratio is between the largest entries of the columns of the scaled M. So it compares a DOF's inertia with what
-    else acts on it, at the time scale of the heavy DOFs.
+    At the slowest DOF's own frequency g the rows and columns of ``|K| + g |C| + g^2 |M|`` are scaled, first by the
+    means of the logarithms of their entries and then until their largest entries are one; the ratio is between the
+    largest entries of the columns of the scaled M. So it compares a DOF's inertia with what else acts on it, at the
+    time scale of the heavy DOFs.
+
+    Notes
+    -----
+    A light DOF and a slow one beside ordinary ones are the same model in other units: masses of 1 and 1e-13 kg on
+    springs of 1 N/m are masses of 1 kg on springs of 1 and 1e13 N/m, with the second DOF in other units. So equal
+    numbers in M can have any ratio: what is small is the share of the inertia in the equation of motion.
     """
     M, C, K = (np.abs(matrix) for matrix in (model.M, model.C, model.K))
-    speeds = own_speeds(model)
-    gamma = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
-    rows, columns = equilibrating_factors(K + gamma * C + gamma**2 * M, even=2.0)
+    gamma = slowest_speed(model)
+    rows, columns = unit_free_factors(K + gamma * C + gamma**2 * M)
     mass = (M * rows[:, None] * columns).max(axis=0)
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
 
@@ -210,6 +216,14 @@ def own_speeds(model: SecondOrderModel) -> FloatArray:
     mass, drag, stiffness = (np.abs(matrix.diagonal()) for matrix in (model.M, model.C, model.K))
     with_mass = np.where(mass > 0.0, mass, np.inf)
     return np.asarray(np.maximum(stiffness / with_mass, (drag / with_mass) ** 2))
+
+
+def slowest_speed(model: SecondOrderModel) -> float:
+    """Give the own frequency of the slowest DOF, or a mean frequency of the entries where no DOF has one by itself."""
+    speeds = own_speeds(model)
+    if (speeds > 0.0).any():
+        return float(np.sqrt(speeds[speeds > 0.0].min()))
+    return float(np.exp2(time_log([model.K, model.C, model.M])))
 
 
 def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
@@ -230,15 +244,18 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
         model's units are; elsewhere they select DOFs.
     """
     unit = unit_matrix(len(model.dofs))
-    row_logs, column_logs, _ = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
-    rows, columns = np.exp2(np.round(row_logs))[:, None], np.exp2(np.round(column_logs))
-    massive, massless, first = _null_split("M", rows * model.M * columns, _Span(unit, unit), model.dofs, tol)
-    drag = cancelled(rows * model.C * columns, massless.columns, massless.sizes)
+    row_logs, column_logs, time = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
+    rows, columns = np.exp2(row_logs)[:, None], np.exp2(column_logs)
+    mass, damping = [
+        rows * np.exp2(k * time) * matrix * columns for k, matrix in ((2.0, model.M), (1.0, model.C))
+    ]
+    massive, massless, first = _null_split("M", mass, _Span(unit, unit), model.dofs, tol)
+    drag = cancelled(damping, massless.columns, massless.sizes)
     half, static, second = _null_split("C", drag, massless, model.dofs, tol)
     basis = np.hstack([massive.columns, half.columns, static.columns]) * columns[:, None]
     sizes = np.hstack([massive.sizes, half.sizes, static.sizes]) * columns[:, None]
-    lengths = np.exp2(-np.ceil(np.log2(np.abs(basis).max(axis=0))))
-    basis, sizes = basis * lengths, sizes * lengths
+    lengths = lengths_of_columns(basis)
+    basis, sizes = basis / lengths, sizes / np.abs(lengths)
     return DofPartition(
         method="orthogonal",
         order=np.arange(basis.shape[0]),
@@ -311,7 +328,7 @@ def _null_split(
         if part.shape[0] == 0:
             null.append(own)
             continue
-        row_factors, factors = equilibrating_factors(part, even=2.0)
+        row_factors, factors = levelling_factors(part)
         _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
         bound = tol
         if bound is None:
@@ -336,6 +353,18 @@ def _null_split(
         ranging.append(whole.part(np.arange(rank)))
         null.append(whole.part(np.arange(rank, block.size)))
     return _joined(ranging), _joined(null), evidence
+
+
+def lengths_of_columns(basis: FloatArray) -> FloatArray:
+    """Give what columns of T are divided by, so that one that selects a DOF is that, and others are about one.
+
+    The single entry of a column, or a power of two near the largest of several.
+    """
+    size = np.abs(basis)
+    places = size.argmax(axis=0)
+    single = np.count_nonzero(basis, axis=0) == 1
+    every = np.arange(basis.shape[1])
+    return np.where(single, basis[places, every], np.exp2(np.ceil(np.log2(size[places, every]))))
 
 
 def _joined(spans: list[_Span]) -> _Span:

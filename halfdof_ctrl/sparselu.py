@@ -19,7 +19,7 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from halfdof_ctrl.arrays import FloatArray
-from halfdof_ctrl.scaling import EVEN, MOST_PASSES, inverse_roots
+from halfdof_ctrl.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
 from halfdof_ctrl.sparsearrays import (
     SparseMatrix,
     column_of_entries,
@@ -34,6 +34,7 @@ REFINED = 2.0**-46  #: componentwise backward error of the test solution above w
 UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
 SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
 SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
+SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
@@ -54,8 +55,19 @@ class SparseLU:
 
     @classmethod
     def factorized(cls, matrix: SparseMatrix) -> "SparseLU":
-        """Equilibrate, factorize and estimate the condition."""
-        rows, columns = sparse_equilibrating_factors(matrix)
+        """Equilibrate, factorize and estimate the condition.
+
+        Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
+        logarithms of its entries, which does not depend on units, and judged again.
+        """
+        first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
+        if not first.is_singular:
+            return first
+        second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
+        return second if second.rcond > first.rcond else first
+
+    @classmethod
+    def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
         scaled = scaled_matrix(matrix, rows, columns)
         factors, corrected = _factorized(csc_array(scaled.T))
         rcond = 0.0 if factors is None else _reciprocal_condition(scaled, factors)
@@ -126,6 +138,20 @@ def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tu
         if maxima.size == 0 or (maxima.min() >= 1.0 / even and maxima.max() <= even):
             break
         down, across = inverse_roots(by_row), inverse_roots(by_column)
+        rows *= down
+        columns *= across
+        size.data *= down[size.indices]
+        size.data *= across[column]
+    return rows, columns
+
+
+def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
+    """Give factors as `scaling.levelling_factors` does, for a sparse matrix."""
+    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    column = column_of_entries(size)
+    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    for _ in range(MOST_PASSES):
+        down, across = [1.0 / root_or_one(maxima) for maxima in largest_by_row_and_column(size)]
         rows *= down
         columns *= across
         size.data *= down[size.indices]

@@ -30,19 +30,21 @@ from halfdof_ctrl.partition import (
     RANK_TOLERANCE,
     IndexArray,
     RankDecision,
+    lengths_of_columns,
     mixture_names,
-    own_speeds,
+    slowest_speed,
     spread_is_wide,
     warn_of_tiny_masses,
 )
-from halfdof_ctrl.scaling import equilibrating_factors
+from halfdof_ctrl.scaling import evening_logs, unit_free_factors
 from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse, column_of_entries, largest_by_row_and_column, sparse_unit
-from halfdof_ctrl.sparselu import scaled_matrix, sparse_equilibrating_factors
+from halfdof_ctrl.sparselu import scaled_matrix, sparse_levelling_factors
 
 Mask = npt.NDArray[np.bool_]
 
 INERTIAL, HALF, STATIC = 0, 1, 2  #: kinds of columns
 LARGEST_BLOCK = 1000  #: columns of a connected part of M or C whose rank is decided by a singular value decomposition
+SETTLED = 1e-8  #: accuracy of the scaling in which masses are compared, squared residual over the first one
 LARGEST_BASIS = 5000  #: DOFs up to which T is given as a dense matrix
 
 
@@ -221,10 +223,11 @@ def cancelled(matrix: SparseMatrix, columns: SparseMatrix, sizes: SparseMatrix) 
 def _mass_ratios(model: SecondOrderModel) -> FloatArray:
     """Give each DOF's mass relative to the largest, free of units, as `partition.mass_ratios` does."""
     M, C, K = (abs(as_sparse(matrix)) for matrix in (model.M, model.C, model.K))
-    speeds = own_speeds(model)
-    gamma = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
-    rows, columns = sparse_equilibrating_factors(csc_array(K + gamma * C + gamma**2 * M), even=2.0)
-    _, mass = largest_by_row_and_column(scaled_matrix(csc_array(M), rows, columns))
+    gamma = slowest_speed(model)
+    total = csc_array(K + gamma * C + gamma**2 * M)
+    rows, columns = [np.exp2(logs) for logs in evening_logs(total, settled=SETTLED)]
+    down, across = sparse_levelling_factors(scaled_matrix(total, rows, columns))
+    _, mass = largest_by_row_and_column(scaled_matrix(csc_array(M), down * rows, across * columns))
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
 
 
@@ -278,7 +281,7 @@ def _null_split(
         own_rows, own, own_sizes = _dense_block(span, block)
         linked = product[:, block]
         part = np.asarray(linked[np.unique(linked.indices)].toarray())
-        row_factors, factors = equilibrating_factors(part, even=2.0)
+        row_factors, factors = unit_free_factors(part)
         _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
         bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
         rank = int(np.count_nonzero(values > bound * values[0]))
@@ -294,9 +297,9 @@ def _null_split(
         speck = 4 * max(part.shape) * np.finfo(float).eps * spread
         clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)
         size = (own_sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True) * spread
-        mixtures.append(
-            _Mixture(own_rows, block, own @ (factors[:, None] * clean), np.repeat(size, block.size, axis=1))
-        )
+        mixed = own @ (factors[:, None] * clean)
+        lengths = lengths_of_columns(mixed)
+        mixtures.append(_Mixture(own_rows, block, mixed / lengths, size / np.abs(lengths)))
         null[block[rank:]] = True
     return span.replaced(mixtures), null, evidence
 
