@@ -54,7 +54,7 @@ class LeadingMatrix:
         leading = cls._scaled(W, rows, columns)
         if leading.rcond == 0.0 or leading.rcond >= enough:
             return leading
-        better = cls._scaled(W, *leading._best_scaling())
+        better = cls._scaled(W, *leading.best_scaling())
         return better if better.rcond > leading.rcond else leading
 
     @classmethod
@@ -63,8 +63,8 @@ class LeadingMatrix:
         factors, pivots, rcond = _lu_and_rcond(matrix)
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
 
-    def _best_scaling(self) -> tuple[FloatArray, FloatArray]:
-        """Give powers of two near the factors with which W has its least 1-norm condition number.
+    def best_scaling(self) -> tuple[FloatArray, FloatArray]:
+        """Give powers of two near the row and column factors with which W has its least 1-norm condition number.
 
         The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
         any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
@@ -73,6 +73,7 @@ class LeadingMatrix:
             return np.ones(len(self.factors)), np.ones(len(self.factors))
         size, inverse = np.abs(self.equilibrated), np.abs(dgetri(self.factors, self.pivots)[0])
         u, least = np.ones(len(size)), np.inf
+        best = u, u
         for _ in range(MOST_STEPS):
             across = u @ size
             following = across @ inverse

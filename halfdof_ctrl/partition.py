@@ -246,9 +246,7 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
     unit = unit_matrix(len(model.dofs))
     row_logs, column_logs, time = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
     rows, columns = np.exp2(row_logs)[:, None], np.exp2(column_logs)
-    mass, damping = [
-        rows * np.exp2(k * time) * matrix * columns for k, matrix in ((2.0, model.M), (1.0, model.C))
-    ]
+    mass, damping = [rows * np.exp2(k * time) * matrix * columns for k, matrix in ((2.0, model.M), (1.0, model.C))]
     massive, massless, first = _null_split("M", mass, _Span(unit, unit), model.dofs, tol)
     drag = cancelled(damping, massless.columns, massless.sizes)
     half, static, second = _null_split("C", drag, massless, model.dofs, tol)
@@ -322,7 +320,7 @@ def _null_split(
     """
     nothing = span.part(np.zeros(0, dtype=np.intp))
     ranging, null, evidence = [nothing], [nothing], []
-    for block in _linked_columns(product):
+    for block in connected_columns(product):
         own, part = span.part(block), product[:, block]
         part = part[part.any(axis=1)]
         if part.shape[0] == 0:
@@ -364,14 +362,14 @@ def lengths_of_columns(basis: FloatArray) -> FloatArray:
     places = size.argmax(axis=0)
     single = np.count_nonzero(basis, axis=0) == 1
     every = np.arange(basis.shape[1])
-    return np.where(single, basis[places, every], np.exp2(np.ceil(np.log2(size[places, every]))))
+    return np.asarray(np.where(single, basis[places, every], np.exp2(np.ceil(np.log2(size[places, every])))))
 
 
 def _joined(spans: list[_Span]) -> _Span:
     return _Span(np.hstack([span.columns for span in spans]), np.hstack([span.sizes for span in spans]))
 
 
-def _linked_columns(product: FloatArray) -> list[IndexArray]:
+def connected_columns(product: FloatArray) -> list[IndexArray]:
     """Group the columns that share nonzero rows, directly or through others."""
     rows, columns = product.shape
     i, j = np.nonzero(product)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csr_array
+from scipy.sparse import coo_array, csc_array, csr_array
 
 from halfdof_ctrl.arrays import FloatArray, Matrix
 
@@ -101,7 +101,7 @@ def logarithmic_scaling(coefficients: FloatArray) -> tuple[FloatArray, FloatArra
     return solution[:n], solution[n : 2 * n], float(solution[-1])
 
 
-def evening_logs(matrix: Matrix, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
+def evening_logs(matrix: Matrix | csc_array, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
     """Give the logarithms of the row and column factors that bring all entries of one matrix nearest to one.
 
     As `logarithmic_scaling` without time, and quicker for large matrices.
@@ -137,7 +137,7 @@ def unit_free_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rows * down, columns * across
 
 
-def time_log(coefficients: Sequence[Matrix], settled: float = SETTLED) -> float:
+def time_log(coefficients: Sequence[Matrix | csc_array], settled: float = SETTLED) -> float:
     """Give the logarithm of the time factor of `logarithmic_scaling`, for dense or sparse coefficients.
 
     Examples
@@ -162,8 +162,8 @@ def _evening(
     i: IndexArray, j: IndexArray, logs: FloatArray, shape: tuple[int, int], settled: float
 ) -> tuple[FloatArray, FloatArray]:
     """Minimize the squares of ``logs + r_i + c_j`` by conjugate gradients on c (Curtis and Reid, 1972)."""
-    times: FloatArray | csr_array = csr_array((np.ones(i.size), (i, j)), shape=shape)
-    times = times.toarray() if max(shape) <= SMALL else times
+    pattern = csr_array((np.ones(i.size), (i, j)), shape=shape)
+    times = np.asarray(pattern.toarray()) if max(shape) <= SMALL else pattern
     back = times.T
     in_row, in_column = (np.maximum(np.bincount(k, minlength=n), 1) for k, n in zip((i, j), shape, strict=True))
     by_row = -np.bincount(i, logs, shape[0])
@@ -184,14 +184,12 @@ def _evening(
     return (by_row - times @ columns) / in_row, columns
 
 
-def _entries(matrix: Matrix) -> tuple[IndexArray, IndexArray, FloatArray]:
+def _entries(matrix: Matrix | csc_array) -> tuple[IndexArray, IndexArray, FloatArray]:
     """Give the rows, columns and sizes of the nonzero entries."""
-    if isinstance(matrix, np.ndarray):
-        i, j = np.nonzero(matrix)
-        return i, j, np.abs(matrix[i, j])
-    entries = matrix.tocoo()
+    entries = coo_array(matrix)
     present = np.flatnonzero(entries.data)
-    return entries.coords[0][present], entries.coords[1][present], np.abs(entries.data[present])
+    i, j = entries.coords
+    return i[present].astype(np.intp), j[present].astype(np.intp), np.abs(entries.data[present])
 
 
 def levelling_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:

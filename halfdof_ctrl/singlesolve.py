@@ -11,7 +11,7 @@ import numpy as np
 from halfdof_ctrl.arrays import FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.leading import LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.partition import DofPartition
+from halfdof_ctrl.partition import DofPartition, connected_columns
 from halfdof_ctrl.scaling import logarithmic_scaling
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
@@ -55,23 +55,36 @@ def rounding_of_solve(
 ) -> Rounding:
     """Bound the rounding errors of (3) and (5).
 
-    An input's column in the solution of (3) is known to 32 n eps of its largest entry, measured in unknowns that are
-    scaled to be the same in any units.
+    A column in the solution of (3) is known to 32 n eps of its largest entry, measured in unknowns that are
+    scaled to be the same in any units; of the largest one among unknowns that W connects, since others have neither
+    errors nor units in common.
     """
-    A = np.abs(equations.A)
     row_logs, _, _ = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
-    scale = 1.0 / np.abs(np.exp2(row_logs)[:, None] * leading_columns(model, partition)).max(axis=0)
+    W = leading_columns(model, partition)
+    scale = 1.0 / np.abs(np.exp2(row_logs)[:, None] * W).max(axis=0)[:, None]
+    parts = connected_columns(W)
+
+    def sizes_of_solution(right: FloatArray) -> FloatArray:
+        solution = np.abs(leading.solve(np.asfortranarray(right))) / scale
+        for part in parts:
+            solution[part] = solution[part].max(axis=0, initial=0.0)
+        return scale * solution
+
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     known_to = np.abs(partition.T) if partition.sizes is None else partition.sizes
+    A, X = np.abs(equations.A), np.abs(equations.displacement.X)
+    free = sizes_of_solution(
+        np.hstack([partition.times_basis(model.K, 0, moving), partition.times_basis(model.C, 0, n_i)])
+    )
+    A[n_i:] = np.maximum(A[n_i:], np.vstack([free[n_i:moving], free[:n_i]]))
+    X[:, :moving] = np.maximum(X[:, :moving], known_to[:, :moving])
+    X = np.maximum(X, known_to[:, moving:] @ free[moving:])
     rates, statics = [], []
     for force in (model.B, model.Bv, model.Ba):
-        solution = np.abs(leading.solve(np.asfortranarray(force))) / scale[:, None]
-        size = scale[:, None] * solution.max(axis=0)
+        size = sizes_of_solution(force)
         rates.append(np.vstack([np.zeros_like(size[:n_i]), size[n_i:moving], size[:n_i]]))
         statics.append(known_to[:, moving:] @ size[moving:])
     shift = rates[1] + A @ rates[2]
-    X = np.abs(equations.displacement.X)
-    X[:, :moving] = np.maximum(X[:, :moving], known_to[:, :moving])
     return Rounding(
         relative=ROUNDING * len(model.dofs),
         A=A,

@@ -5,18 +5,20 @@ import warnings
 import exact
 import numpy as np
 import pytest
+from anykinds import Kind, chain, constrained, drawn_models, in_units
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, structures
 
-from halfdof_ctrl import exact_reduction, hydromount, mech2ss, mechss
+from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.errors import NearlyMasslessWarning
-from halfdof_ctrl.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns
+from halfdof_ctrl.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns, without_light_masses
 
 ORTHOGONAL = 1e-12  # products of orthonormal vectors with small integer matrices, n <= 12
 THERE_AND_BACK = 1e-10  # T of up to 12 mixed columns, scaled by powers of two, has a condition of up to 1e5
 ROUNDOFF = 1e-12  # small well-conditioned matrices
+SAME = 1e-6  # the same number in other units; the scaling behind it is iterated
 
 
 @given(structure=structures())
@@ -158,12 +160,64 @@ def test_warning_does_not_depend_on_units(powers: list[int]) -> None:
 
 @given(powers=st.lists(st.integers(-9, 9), min_size=5, max_size=5))
 def test_mass_ratios_do_not_depend_on_units(powers: list[int]) -> None:
-    """Within the factor that powers of two leave, a ratio is the same in all units."""
+    """DOFs, equations and time in units of 10^k: the same ratios, and the same masses below `tol`."""
     S, R, tau = np.diag(10.0 ** np.array(powers[:2])), np.diag(10.0 ** np.array(powers[2:4])), 10.0 ** powers[4]
     M, C, K = light_and_heavy(1e-6)
-    ratio = mass_ratios(mechss(R @ M @ S * tau**2, R @ C @ S * tau, R @ K @ S))
-    assert ratio.max() == 1.0
-    assert 1e-9 < ratio.min() < 1e-3
+    model = mechss(R @ M @ S * tau**2, R @ C @ S * tau, R @ K @ S)
+    ratio = mass_ratios(model)
+    assert_allclose(ratio, mass_ratios(mechss(M, C, K)), rtol=SAME)
+    assert 1e-7 < ratio.min() < 1e-5
+    for tol, light in ((0.5 * ratio.min(), ()), (2.0 * ratio.min(), ("q1",))):
+        assert select_columns(model, tol).half == light
+        assert without_light_masses(model, tol).M[1, 1].any() != bool(light)
+
+
+POWERS = st.lists(st.integers(-9, 9), min_size=12, max_size=12)
+
+
+@pytest.mark.parametrize("base", [8.0, 10.0])
+@given(case=drawn_models(), columns=POWERS, rows=POWERS, time=st.integers(-9, 9))
+def test_mass_ratios_of_any_model_do_not_depend_on_units(
+    base: float, case: tuple[Structure, SecondOrderModel], columns: list[int], rows: list[int], time: int
+) -> None:
+    """Small integers, whatever their pattern, never look like light masses, in no units."""
+    structure, model = case
+    n = structure.size
+    ratio = mass_ratios(model)
+    scaled = in_units(model, base ** np.array(columns[:n]), base ** np.array(rows[:n]), base**time)
+    assert_allclose(mass_ratios(scaled), ratio, rtol=SAME)
+    assert ratio[structure.M.any(axis=0)].min(initial=1.0) > 1e-4
+
+
+@pytest.mark.parametrize(("kind", "size", "seed"), [(chain, 9, 131000956), (constrained, 11, 131001575)])
+def test_constrained_models_give_no_false_warning(kind: Kind, size: int, seed: int) -> None:
+    """Masses and stiffness that hardly share equations: even maxima left their scale open by ten decades."""
+    generator = np.random.default_rng([seed, size])
+    structure = kind(generator, size)
+    generator = np.random.default_rng([seed, 8])
+    columns, rows = 8.0 ** generator.integers(-9, 10, (2, size))
+    model = in_units(structure.model(), columns, rows, 8.0 ** int(generator.integers(-9, 10)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", NearlyMasslessWarning)
+        select_columns(model)
+
+
+def test_mass_ratios_without_own_frequencies_do_not_depend_on_time() -> None:
+    """Two DOFs whose equations are exchanged: no mass meets its own spring, and the ratios are those of the pair."""
+    M, K = np.array([[0.0, 1.0], [1e-6, 0.0]]), np.array([[2.0, 0.0], [0.0, 3.0]])
+    for tau in (1e-5, 1.0, 1e7):
+        assert_allclose(mass_ratios(mechss(M * tau**2, None, K)), [1.0, 1.0], rtol=SAME)
+
+
+def test_slow_dof_and_light_dof_are_the_same_in_other_units() -> None:
+    """Masses 1 and 1e-12 on springs of 1 are masses 1 on springs of 1 and 1e12, the second equation in other units.
+
+    At the slow frequency of 1 rad/s the inertia is a half of what acts on the first DOF, 1e-12 on the second.
+    """
+    light = mechss(np.diag([1.0, 1e-12]), None, np.eye(2))
+    slow = mechss(np.eye(2), None, np.diag([1.0, 1e12]))
+    assert_allclose(mass_ratios(light), [1.0, 2e-12], rtol=SAME)
+    assert_allclose(mass_ratios(slow), mass_ratios(light), rtol=SAME)
 
 
 def test_mass_ratios_of_a_massless_model_are_zero() -> None:

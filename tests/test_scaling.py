@@ -1,13 +1,24 @@
-"""Equilibration: powers of two that bring row and column maxima near one."""
+"""Scaling: powers of two that bring maxima near one, and logarithmic means that are the same in any units."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csc_array
 
-from halfdof_ctrl.scaling import EVEN, equilibrating_factors
+from halfdof_ctrl.scaling import (
+    EVEN,
+    equilibrating_factors,
+    evening_logs,
+    levelling_factors,
+    logarithmic_scaling,
+    time_log,
+    unit_free_factors,
+)
+from halfdof_ctrl.sparselu import sparse_levelling_factors
 
+ITERATED = 1e-6  # in logarithms to the base of two, after conjugate gradients
 SHAPES = st.tuples(st.integers(1, 8), st.integers(1, 8))
 
 
@@ -47,3 +58,57 @@ def test_matrix_is_not_changed() -> None:
     matrix = np.array([[1e9, 0.0], [0.0, 1e-9]])
     equilibrating_factors(matrix)
     assert_array_equal(matrix, [[1e9, 0.0], [0.0, 1e-9]])
+
+
+def badly_scaled(seed: int, shape: tuple[int, int], share: float = 0.6) -> tuple[np.ndarray, np.ndarray]:
+    """Draw a matrix with gaps, zero rows perhaps, and the same in units far apart."""
+    generator = np.random.default_rng(seed)
+    matrix = generator.standard_normal(shape) * (generator.random(shape) < share)
+    down, across = (10.0 ** generator.integers(-9, 10, size) for size in shape)
+    return matrix, matrix * down[:, None] * across
+
+
+@given(shape=SHAPES, seed=st.integers(0, 2**32 - 1))
+def test_logarithmic_factors_are_a_least_squares_solution(shape: tuple[int, int], seed: int) -> None:
+    """The logarithms of the scaled entries add up to zero in every row and column: the normal equations."""
+    _, matrix = badly_scaled(seed, shape)
+    rows, columns = evening_logs(matrix)
+    scaled = matrix * np.exp2(rows)[:, None] * np.exp2(columns)
+    logs = np.log2(np.abs(scaled), out=np.zeros_like(scaled), where=scaled != 0.0)
+    assert_allclose(logs.sum(axis=0), 0.0, atol=ITERATED)
+    assert_allclose(logs.sum(axis=1), 0.0, atol=ITERATED)
+
+
+@given(shape=SHAPES, seed=st.integers(0, 2**32 - 1))
+def test_scaled_matrix_is_the_same_in_any_units(shape: tuple[int, int], seed: int) -> None:
+    """Least squares have one residual; what follows it starts there."""
+    both = [matrix * r[:, None] * c for matrix in badly_scaled(seed, shape) for r, c in [unit_free_factors(matrix)]]
+    assert_allclose(both[1], both[0], rtol=ITERATED)
+    assert np.abs(both[0]).max(initial=0.0) <= 1.0 + ITERATED
+
+
+@pytest.mark.parametrize("size", [3, 12, 60])
+@pytest.mark.parametrize("share", [0.1, 0.6])
+def test_sparse_and_direct_solutions_agree(size: int, share: float) -> None:
+    """Conjugate gradients on a dense pattern, on a sparse one, and a direct solution: the same scaled entries."""
+    _, matrix = badly_scaled(size, (size, size), share)
+    sums = [
+        (rows[:, None] + columns)[matrix != 0.0]
+        for rows, columns in (
+            evening_logs(matrix),
+            evening_logs(csc_array(matrix)),
+            logarithmic_scaling(matrix[None])[:2],
+        )
+    ]
+    assert_allclose(sums[1], sums[0], atol=ITERATED)
+    assert_allclose(sums[2], sums[0], atol=ITERATED)
+    for mine, dense in zip(sparse_levelling_factors(csc_array(matrix)), levelling_factors(matrix), strict=True):
+        assert_allclose(mine, dense, rtol=ITERATED)
+
+
+@given(size=st.integers(1, 8), seed=st.integers(0, 2**32 - 1))
+def test_time_is_that_of_the_direct_solution(size: int, seed: int) -> None:
+    """The mean time scale of full K, C and M; zero where rows and columns can take it up."""
+    coefficients = np.stack([badly_scaled(seed + k, (size, size), 1.0)[1] for k in range(3)])
+    assert_allclose(time_log(list(coefficients)), logarithmic_scaling(coefficients)[2], atol=ITERATED)
+    assert time_log([np.eye(size), np.zeros((size, size)), np.zeros((size, size))]) == 0.0

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import block_diag, csc_array, diags_array, eye_array
+from test_leading import arrow
 
 from halfdof_ctrl import sparselu
 from halfdof_ctrl.scaling import equilibrating_factors
@@ -126,3 +127,13 @@ def test_unsymmetric_patterns_are_ordered_by_columns() -> None:
     assert not is_nearly_symmetric(csc_array(W - eye_array(50) * 1.0))
     lu = SparseLU.factorized(W)
     assert_allclose(times(W, lu.solve(np.ones((50, 1)))) * lu.rows[:, None], np.ones((50, 1)), rtol=1e-9)
+
+
+def test_even_maxima_do_not_hide_a_regular_matrix() -> None:
+    """An arrow of ones over a diagonal of 2^-60: regular in other units, as for the dense leading matrix."""
+    matrix = csc_array(arrow(2.0**-60))
+    lu = SparseLU.factorized(matrix)
+    assert not lu.is_singular
+    assert lu.rcond > 0.05
+    right = lu.rows[:, None] * (matrix @ np.array([[1.0], [2.0**60], [2.0**60]]))
+    assert_allclose(lu.solve(right), [[1.0], [2.0**60], [2.0**60]], rtol=SOLVED)

@@ -2,17 +2,19 @@
 
 import numpy as np
 import pytest
+from anykinds import drawn_models
 from fe_models import spring_grid
 from hypothesis import assume, given
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import block_diag, csc_array
 from structures import Structure, rank_deficient, structures
 
-from halfdof_ctrl import mechss, sparsepartition
+from halfdof_ctrl import SecondOrderModel, mechss, sparsepartition
 from halfdof_ctrl.errors import ModelSizeError, NearlyMasslessWarning
-from halfdof_ctrl.partition import orthonormal_bases, select_columns
-from halfdof_ctrl.sparsepartition import select_sparse_columns, sparse_bases
+from halfdof_ctrl.partition import mass_ratios, orthonormal_bases, select_columns
+from halfdof_ctrl.sparsepartition import _mass_ratios, select_sparse_columns, sparse_bases
 
+SETTLED = 1e-2  # the sparse scaling is iterated to a hundredth of a power of two
 ROUNDOFF = 1e-12  # products of small integer matrices with orthonormal blocks
 
 
@@ -85,6 +87,15 @@ def test_a_tiny_mass_is_warned_of_and_may_be_left_out() -> None:
     assert str(mine[0].message) == str(dense[0].message)
     partition = select_sparse_columns(mechss(csc_array(M), np.diag([0.0, 4.0, 0.0]), K), tol=1e-9)
     assert (partition.inertial, partition.half, partition.static) == (("q0",), ("q1",), ("q2",))
+
+
+@given(case=drawn_models(largest=9))
+def test_mass_ratios_are_the_dense_ones(case: tuple[Structure, SecondOrderModel]) -> None:
+    """The same column scales, so that the same masses are warned of and `tol` leaves out the same."""
+    structure, model = case
+    assume(structure.M.any())
+    mine, dense = _mass_ratios(mechss(*sparse(structure))), mass_ratios(model)
+    assert_allclose(mine, dense, rtol=SETTLED)
 
 
 def test_a_large_connected_mass_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
