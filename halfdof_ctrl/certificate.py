@@ -4,21 +4,24 @@
 
 holds for every s if and only if A has the finite eigenvalues of the model, each as often. Three points near
 the typical frequency and two beyond the fastest pole tell a count that is wrong: each eigenvalue too many or too few
-changes the ratio between them by a power of the distance. What the state equations lose against a direct solve at
-such points is measured as well.
+changes the ratio between them by a power of the distance. Far out P(s) can be so ill conditioned that floating point
+does not know its determinant; that of small models is formed in integers then. What the state equations lose
+against a direct solve at such points is measured as well.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.integers import as_integers, log_determinant
 from halfdof_ctrl.scaling import equilibrating_factors
 from halfdof_ctrl.signals import StateEquations
 from halfdof_ctrl.spectrum import balanced_states
 
 NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
-BEYOND = 3.0  #: times the fastest pole: how far out the other points lie
+LARGEST_EXACT = 60  #: equations up to which determinants may be formed in integers
 DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
 SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
 AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
@@ -54,15 +57,23 @@ class ScaledPencil:
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""
         fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
-        points = [*NEAR, *(BEYOND * max(fastest, 1.0) * direction for direction in NEAR[:2])]
+        beyond = 1 + math.frexp(max(fastest, 1.0))[1]  # powers of two, so that P(s) can be formed exactly
+        points = [*NEAR, *(2.0**power for power in (beyond, beyond + 1))]
         unit = np.eye(len(A))
-        logs = []
-        for s in points:
-            P, _ = self.at(s)
-            rows, columns = equilibrating_factors(np.abs(P), even=2.0)
-            scale = float(np.log(rows).sum() + np.log(columns).sum())
-            logs.append(np.linalg.slogdet(P * rows[:, None] * columns)[1] - scale - np.linalg.slogdet(s * unit - A)[1])
-        return bool(np.ptp(logs) <= DRIFT)
+        of_A = np.array([np.linalg.slogdet(s * unit - A)[1] for s in points])
+        of_P = np.array([self._log_determinant(s) for s in points])
+        if np.ptp(of_P - of_A) > DRIFT and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
+            integers, scale = as_integers(self.P)
+            for place, power in ((-2, beyond), (-1, beyond + 1)):
+                exact = integers[0] + (integers[1] << power) + (integers[2] << 2 * power)
+                of_P[place] = log_determinant(exact) - self.P.shape[1] * scale * math.log(2.0)
+        return bool(np.ptp(of_P - of_A) <= DRIFT)
+
+    def _log_determinant(self, s: complex) -> float:
+        P, _ = self.at(s)
+        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
+        scale = float(np.log(rows).sum() + np.log(columns).sum())
+        return float(np.linalg.slogdet(P * rows[:, None] * columns)[1]) - scale
 
     def losses(self, equations: StateEquations) -> "Losses":
         """Compare the state equations, balanced, with direct solves at the points on the axis."""

@@ -22,8 +22,9 @@ import numpy as np
 
 from halfdof_ctrl.arrays import FloatArray, read_only
 from halfdof_ctrl.leading import LeadingMatrix
-from halfdof_ctrl.offsets import IndexArray, Offsets
-from halfdof_ctrl.relaxation import EPS, Caution, RowSystem, Units, independent_rows, unit_free
+from halfdof_ctrl.offsets import BoolArray, IndexArray, Offsets
+from halfdof_ctrl.relaxation import independent_rows
+from halfdof_ctrl.rowsystems import EPS, Caution, RowSystem, Units, unit_free
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
 PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
@@ -34,6 +35,8 @@ CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
 class Realization:
     """State equations, and what they rest on."""
 
+    chain: "Chain"
+    nothing: BoolArray  #: (orders, n, N + m L) which coefficients of q, q', ... count as zero
     states: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
     equations: StateEquations
     errors: tuple[FloatArray, ...]  #: (n, m) each, mean rounding errors of the displacements' U_0, U_1, ...
@@ -79,7 +82,7 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
     Realization
         In the units of the system.
     """
-    chain = _Chain.of(system, offsets)
+    chain = Chain.of(system, offsets)
     states = chain.states()
     derivatives, rcond = chain.solved(states, caution)
     N, m = len(states), system.coefficients.shape[2] - system.size
@@ -94,7 +97,14 @@ def realized(system: RowSystem, offsets: Offsets, caution: Caution) -> Realizati
         errors[k] = errors[k] + np.abs(X) @ error + np.sqrt(motion.square[:, :N]) @ np.abs(part)
     displacement = Signal(X, trimmed(tuple(U)))
     equations = StateEquations(A=A, B=B + 0.0, displacement=displacement, shift=trimmed(shift))
-    return Realization(states=states, equations=equations, errors=tuple(errors), rcond=rcond)
+    return Realization(
+        chain=chain,
+        nothing=derivatives.value == 0.0,
+        states=states,
+        equations=equations,
+        errors=tuple(errors),
+        rcond=rcond,
+    )
 
 
 def in_model_units(realization: Realization, units: Units) -> StateEquations:
@@ -139,7 +149,7 @@ def rounding_in_model_units(realization: Realization, units: Units, columns: Flo
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Chain:
+class Chain:
     """The levels of (18)."""
 
     system: RowSystem
@@ -148,14 +158,14 @@ class _Chain:
     determined: tuple[IndexArray, ...]  #: S_0, S_1, ...
 
     @classmethod
-    def of(cls, system: RowSystem, offsets: Offsets) -> "_Chain":
+    def of(cls, system: RowSystem, offsets: Offsets) -> "Chain":
         """Choose S_l inside S_{l-1}, well conditioned and with the last DOFs first, so that the first stay states.
 
         A DOF that equations hardly contain, measured in unit-free scaling, must not follow from them.
         """
         J = offsets.tight(system.matrix)
         determined = [np.arange(system.size)]
-        for level in range(1, _levels(offsets)):
+        for level in range(1, levels(offsets)):
             rows = np.flatnonzero(offsets.equations >= level)
             columns = determined[-1][offsets.unknowns[determined[-1]] >= level]
             columns = columns[::-1]
@@ -169,7 +179,7 @@ class _Chain:
         """Give (unknown, derivative) of the states, displacements first."""
         found = [
             (int(d) - level, j)
-            for level in range(1, _levels(self.offsets))
+            for level in range(1, levels(self.offsets))
             for j, d in enumerate(self.offsets.unknowns)
             if d >= level and j not in self.determined[level]
         ]
@@ -184,7 +194,7 @@ class _Chain:
         for index, (j, order) in enumerate(states):
             found.value[order, j, index] = 1.0
         rcond = 1.0
-        for level in reversed(range(_levels(self.offsets))):
+        for level in reversed(range(levels(self.offsets))):
             rows, columns = np.flatnonzero(c >= level), self.determined[level]
             if rows.size:
                 right = self._right_side(rows, level, found, N)
@@ -227,7 +237,7 @@ class _Chain:
         return _Uncertain(np.where(nothing, 0.0, value), np.where(nothing, 0.0, square)), leading.rcond
 
 
-def _levels(offsets: Offsets) -> int:
+def levels(offsets: Offsets) -> int:
     """Count the levels of (18), with those that have only states."""
     return int(max(offsets.equations.max(), offsets.unknowns.max())) + 1
 

@@ -5,6 +5,7 @@ does not, or where a pencil is called singular whose P(s) is not, the decisions 
 caution about rounding errors. If none passes, the model is refused.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -14,17 +15,22 @@ from halfdof_ctrl.arrays import FloatArray
 from halfdof_ctrl.certificate import NEAR, ScaledPencil
 from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.exactrows import ExactRows
+from halfdof_ctrl.exactsolution import solved_without_rounding
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import derivative_name, listed
 from halfdof_ctrl.nullspaces import causes, null_spaces
 from halfdof_ctrl.offsets import IndexArray, Offsets
 from halfdof_ctrl.partition import RankDecision
 from halfdof_ctrl.refusals import singular_pencil_error
-from halfdof_ctrl.relaxation import EPS, BlockDecision, Caution, Relaxed, RowSystem, Units, relaxed, scaled_rows
+from halfdof_ctrl.relaxation import BlockDecision, Relaxed, relaxed
+from halfdof_ctrl.rowsystems import EPS, Caution, RowSystem, Units, scaled_rows
 from halfdof_ctrl.signals import Rounding, Signal, StateEquations
 from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
+AS_GIVEN = Caution(0.0, 0.0)  #: entries are what they are to the last digit
+LARGEST_EXACT = 60  #: equations up to which row operations are exact
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
 NOISE = 30.0  #: ... and below this times the error that was measured
 TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is rounding
@@ -149,19 +155,34 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     """
     system, units, pencil = _scaled(model)
     decisions: tuple[BlockDecision, ...] = ()
-    for caution in CAUTIONS:
-        relaxation = relaxed(system, caution, tol)
+    exactly = tol is None and system.size <= LARGEST_EXACT
+    for rows, caution in _ways(system, exactly=exactly):
+        relaxation = relaxed(rows, caution, tol)
         decisions = relaxation.decisions
         if relaxation.offsets is None:
             if pencil.is_singular():
                 raise _singular_error(model, pencil)
             continue
         result = realized(relaxation.system, relaxation.offsets, caution)
-        certified = pencil.has_spectrum(result.equations.A)
+        certified = False
+        if isinstance(relaxation.system, ExactRows):
+            result = solved_without_rounding(result, relaxation.system)
+            certified = relaxation.system.exact and caution is not AS_GIVEN
+        certified = certified or pencil.has_spectrum(result.equations.A)
         if certified or tol is not None:
             found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
             return replace(found, certified=certified)
     raise _uncertain_error(model, decisions, tol)
+
+
+def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caution]]:
+    """Give the arithmetic and the caution to be tried in turn."""
+    if exactly:
+        rows = ExactRows.of(system)
+        yield rows, CAUTIONS[0]
+        yield rows, AS_GIVEN
+    for caution in CAUTIONS:
+        yield system, caution
 
 
 def _in_model_units(

@@ -9,6 +9,8 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+MOST_WORDS = 300  #: characters of another library's error that are passed on
+
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
     """Make an error again on the other side of a process boundary."""
@@ -188,6 +190,7 @@ def naming_the_file(path: object) -> Iterator[None]:
         raise
     except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
         reason = " ".join(str(cause).split()) or type(cause).__name__
+        reason = reason if len(reason) <= MOST_WORDS else f"{reason[:MOST_WORDS]}..."  # some quote the file at length
         msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
         raise FileFormatError(msg, path=str(path)) from cause
 

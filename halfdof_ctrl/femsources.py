@@ -13,6 +13,7 @@ from halfdof_ctrl.errors import FileFormatError, naming_the_file
 from halfdof_ctrl.fileroles import nastran_letter, role_of, siblings, with_labels
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.rawmatrix import RawMatrix
+from halfdof_ctrl.textblocks import is_cut_short
 
 ENDINGS = (".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping")  #: in a folder
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
@@ -105,6 +106,9 @@ def _all_files(given: list[Path]) -> list[Path]:
 def _read(path: Path) -> list[RawMatrix] | tuple[str, ...]:  # noqa: PLR0911  # one return a format
     """Read the matrices of a file, or the names of rows, by what its content is."""
     content = path.read_bytes()
+    if is_cut_short(content):
+        msg = "the last number has fewer digits than those before it. The file is cut short: write or copy it anew."
+        raise FileFormatError(msg, path="")
     doubts = () if content.endswith((b"\n", b"\r")) else (NO_LAST_LINE_END,)
     if matrixmarket.is_matrix_market(content):
         return [replace(matrixmarket.read_matrix_market(content), doubts=doubts)]

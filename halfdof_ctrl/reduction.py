@@ -65,7 +65,7 @@ LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared wi
 LOSS_LOOKED_FOR = 1e-3  #: ... and in models that are cheap to solve W with a smaller rcond than this
 CHEAP = 60  #: DOFs of these models
 LARGEST_CERTIFIED = 500  #: DOFs up to which a sparse model with mixed coordinates is reduced densely
-LOST = 1e-8  #: a state space that loses more than this against a direct solve is warned of
+LOST = 1e-9  #: a state space that loses more than this against a direct solve is warned of
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -350,7 +350,7 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         A decision about a rank rests on singular values less than 1e3 apart, or W is hardly regular, or `tol`
         is so large that deflation gives the state space of another model.
     LostDigitsWarning
-        A and B lose more than 1e-8 of the largest entry of the transfer function, because W, or J after
+        A and B lose more than 1e-9 of the largest entry of the transfer function, because W, or J after
         deflation, is ill conditioned.
 
     Notes

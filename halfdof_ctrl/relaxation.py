@@ -11,74 +11,24 @@ bound falls (K. Murota, Combinatorial relaxation algorithm, 1995). A few such st
 with an equation of which nothing is left: the pencil is singular then.
 
 Only rows that are dependent are touched, so every unknown keeps its name and every other equation its exact zeros.
-Decisions are taken in the irreducible blocks of J, scaled to be the same in any units. Each coefficient carries
-the mean square of its rounding error; what lies within it is zero.
+Decisions are taken in the irreducible blocks of J, scaled to be the same in any units.
 """
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.arrays import FloatArray, powers_of_two
-from halfdof_ctrl.offsets import BoolArray, IndexArray, Offsets, irreducible_blocks, structural_offsets
-from halfdof_ctrl.scaling import gap_threshold, levelling_factors, logarithmic_scaling
+from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.offsets import IndexArray, Offsets, irreducible_blocks, structural_offsets
+from halfdof_ctrl.rowsystems import EPS, Caution, Elimination, RowSystem, levelled
+from halfdof_ctrl.scaling import gap_threshold
 
-EPS = float(np.finfo(float).eps)
 RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
 PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
-DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
 UNCLEAR = 100.0  #: singular values above the bound and below this times it may be either
 SNAP = 4.0  #: root mean square errors within which a shorter multiplier is as good
 FINEST_DYADIC = 10  #: multipliers within rounding of a multiple of 2^-10 are taken as that
-
-
-@dataclass(frozen=True, slots=True)
-class Caution:
-    """How many mean rounding errors count as nothing: for single coefficients and for singular values."""
-
-    entry: float
-    rank: float
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class RowSystem:
-    """``P(s) q = B(s) u`` in scaled units: n equations and unknowns, m inputs, powers of s up to k - 1."""
-
-    coefficients: FloatArray  #: (k, n, n + m) of [P B]
-    variance: FloatArray  #: (k, n, n + m) mean squares of their rounding errors
-    row_logs: FloatArray  #: (n,) what rows still lack, as powers of two, to be the same in any units
-    column_logs: FloatArray  #: (n,) the same for unknowns
-    time_log: float  #: the same for each power of s
-
-    @property
-    def size(self) -> int:
-        """Number of equations."""
-        return int(self.coefficients.shape[1])
-
-    @property
-    def matrix(self) -> FloatArray:
-        """Coefficients of P, (k, n, n)."""
-        return self.coefficients[:, :, : self.size]
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Units:
-    """Powers of two between the model's units and those of a `RowSystem`.
-
-    ``q = diag(columns) q~, u = diag(inputs) u~, s = time s~``
-    """
-
-    columns: FloatArray  #: (n,)
-    inputs: FloatArray  #: (m,)
-    time: float
-
-    def by_time(self, values: FloatArray, power: npt.ArrayLike) -> FloatArray:
-        """Give ``values time^power`` for integer powers, also where the factor alone is beyond all floats."""
-        exponent = math.frexp(self.time)[1] - 1
-        return np.asarray(np.ldexp(values, np.asarray(power, dtype=np.intc) * exponent))
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -98,26 +48,6 @@ class Relaxed:
     system: RowSystem
     offsets: Offsets | None  #: None for a singular pencil
     decisions: tuple[BlockDecision, ...]
-
-
-def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
-    """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
-    row_logs, column_logs, time_log = logarithmic_scaling(P)
-    row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
-    speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]
-    rows = np.exp2(row_powers)[:, None]
-    first = powers_of_two(np.abs(B).max(axis=(0, 1), initial=0.0))
-    driven = B * first * rows * speed
-    second = powers_of_two(np.abs(driven).max(axis=(0, 1), initial=0.0))
-    scaled = np.concatenate([P * np.exp2(column_powers) * rows * speed, driven * second], axis=2)
-    system = RowSystem(
-        coefficients=scaled,
-        variance=(EPS * scaled) ** 2,
-        row_logs=row_logs - row_powers,
-        column_logs=column_logs - column_powers,
-        time_log=float(time_log - time_power),
-    )
-    return system, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))
 
 
 def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Relaxed:
@@ -140,7 +70,7 @@ def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Re
         if offsets is None or not dependent:
             decisions = tuple([block.decision for block in blocks.values()])
             return Relaxed(system=system, offsets=offsets, decisions=decisions)
-        system = _with_rows_replaced(system, offsets, dependent, caution)
+        system = system.replaced(offsets, dependent, caution)
 
 
 def _blocks(
@@ -158,17 +88,6 @@ def _blocks(
                 known[key] = _Block.of(system, offsets, J, rows, columns, caution, tol)
             found.append(known[key])
     return found
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class _Elimination:
-    """Equation (16) for one row."""
-
-    row: int
-    columns: IndexArray  #: where its tight coefficients vanish
-    sources: IndexArray
-    multipliers: FloatArray  #: x_i
-    errors: FloatArray  #: root mean square errors of x_i
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -225,10 +144,10 @@ class _Block:
             decision=decision,
         )
 
-    def eliminations(self) -> list[_Elimination]:
+    def eliminations(self) -> list[Elimination]:
         """Express the dependent rows by independent ones that are differentiated at least as often."""
         taken: list[int] = []
-        found: list[_Elimination] = []
+        found: list[Elimination] = []
         for times in np.unique(self.times)[::-1].tolist():
             group = np.flatnonzero(self.times == times)
             values = scipy.linalg.svdvals(self.matrix[self.times >= times])
@@ -238,7 +157,7 @@ class _Block:
             found.extend(self._expressed(np.setdiff1d(group, group[picked]), np.array(taken, dtype=np.intp)))
         return found
 
-    def _expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[_Elimination]":
+    def _expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[Elimination]":
         if dependent.size == 0:
             return []
         x: FloatArray = np.zeros((sources.size, dependent.size))
@@ -252,7 +171,7 @@ class _Block:
         ratio = self.row_factors[sources][:, None] / self.row_factors[dependent]
         multipliers, errors = _shortest_dyadic(x * ratio, SNAP * error * ratio), error * ratio
         return [
-            _Elimination(
+            Elimination(
                 row=row,
                 columns=self.columns,
                 sources=self.rows[sources],
@@ -261,29 +180,6 @@ class _Block:
             )
             for k, row in enumerate(self.rows[dependent].tolist())
         ]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ScaledPart:
-    """A part of J in other units."""
-
-    matrix: FloatArray
-    rows: FloatArray  #: factors of the rows
-    columns: FloatArray
-
-
-def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
-    """Scale a part of J so that it is the same in any units."""
-    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
-    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
-    return ScaledPart(J[np.ix_(rows, columns)] * r[:, None] * c, r, c)
-
-
-def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
-    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
-    part = unit_free(system, offsets, J, rows, columns)
-    r, c = levelling_factors(part.matrix)
-    return ScaledPart(part.matrix * r[:, None] * c, part.rows * r, part.columns * c)
 
 
 def independent_rows(matrix: FloatArray, given: FloatArray, count: int, share: float) -> IndexArray:
@@ -326,54 +222,3 @@ def _shortest_dyadic(x: FloatArray, error: FloatArray) -> FloatArray:
         result[hit] = short[hit]
         open_ &= ~hit
     return result
-
-
-def _with_rows_replaced(
-    system: RowSystem, offsets: Offsets, eliminations: list[_Elimination], caution: Caution
-) -> RowSystem:
-    """Apply (17) to the dependent rows; their sources stay as they are."""
-    shifts = [offsets.equations[item.sources] - offsets.equations[item.row] for item in eliminations]
-    longest = max(int(shift.max(initial=0)) for shift in shifts)
-    room = ((0, longest), (0, 0), (0, 0))
-    values, squares = np.pad(system.coefficients, room), np.pad(system.variance, room)
-    row_logs = system.row_logs.copy()
-    k = len(system.coefficients)
-    for item, shift in zip(eliminations, shifts, strict=True):
-        h = item.row
-        row, square = values[:, h].copy(), squares[:, h].copy()
-        for by in np.unique(shift[item.multipliers != 0.0]).tolist():
-            chosen = (item.multipliers != 0.0) & (shift == by)
-            x, sources = item.multipliers[chosen], item.sources[chosen]
-            terms, errors = system.coefficients[:, sources], item.errors[chosen]
-            row[by : by + k] -= np.einsum("i,kij->kj", x, terms)
-            square[by : by + k] += np.einsum("i,kij->kj", x**2, system.variance[:, sources])
-            square[by : by + k] += np.einsum("i,kij->kj", errors**2 + (EPS * x) ** 2, terms**2)
-        square += (EPS * row) ** 2
-        power = offsets.unknowns[item.columns] - offsets.equations[h]
-        tight = (power >= 0) & (power < len(row))
-        row[power[tight], item.columns[tight]] = 0.0
-        nothing = _is_rounding(row, square, caution)
-        row[nothing] = square[nothing] = 0.0
-        values[:, h], squares[:, h], row_logs[h] = _normalized(system, row, square)
-    length = int(np.flatnonzero(values.any(axis=(1, 2))).max(initial=0)) + 1
-    return replace(system, coefficients=values[:length], variance=squares[:length], row_logs=row_logs)
-
-
-def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolArray:
-    """Tell which entries are rounding errors: those below the widest gap in their ratio to the mean error.
-
-    Mean errors tell little more than a power of ten, but what is meant is far above them.
-    """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ratio = np.where(row != 0.0, np.abs(row) / np.sqrt(square), 0.0)
-    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL))
-
-
-def _normalized(system: RowSystem, row: FloatArray, square: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Scale a row of P to about one by a power of two, and give what it then lacks to be the same in any units."""
-    speed = system.time_log * np.arange(len(row))[:, None]
-    size = float((np.abs(row[:, : system.size]) * np.exp2(system.column_logs + speed)).max(initial=0.0))
-    if size == 0.0:
-        return row, square, 0.0
-    power = -np.round(np.log2(size))
-    return np.ldexp(row, int(power)), np.ldexp(square, 2 * int(power)), -float(np.log2(size)) - float(power)

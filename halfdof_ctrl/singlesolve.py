@@ -68,7 +68,7 @@ def rounding_of_solve(
         solution = np.abs(leading.solve(np.asfortranarray(right))) / scale
         for part in parts:
             solution[part] = solution[part].max(axis=0, initial=0.0)
-        return scale * solution
+        return np.asarray(scale * solution)
 
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     known_to = np.abs(partition.T) if partition.sizes is None else partition.sizes

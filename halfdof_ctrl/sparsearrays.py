@@ -44,6 +44,8 @@ MatrixLike: TypeAlias = npt.ArrayLike | SparseLike
 
 MOST_STORED = 2**31 - 1  #: entries of a sparse matrix, which are counted in 32 bits by the factorization
 
+EXTENDED = 2**20  #: entries of a matrix that are copied in extended precision at a time
+
 
 def has_sparse(values: Sequence[object]) -> bool:
     """Tell whether one of the values is a scipy sparse array or matrix."""
@@ -217,6 +219,40 @@ def times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
 def transposed_times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
     """Multiply the transpose of a sparse matrix and a dense matrix."""
     return np.asarray(matrix.T @ dense)
+
+
+def exact_residual(matrix: SparseMatrix, right: Matrix, solution: Matrix, *, transposed: bool = False) -> Matrix:
+    """Give ``right - matrix solution``, summed in extended precision and rounded once.
+
+    Some columns of the matrix are worked at a time, so that it is not copied in that precision. Where a long double is
+    a double (Windows, ARM), this is the plain residual.
+
+    Examples
+    --------
+    >>> exact_residual(csc_array([[3.0]]), np.array([[1.0]]), np.array([[2.0]])).tolist()
+    [[-5.0]]
+    """
+    rest = np.array(right, dtype=np.longdouble)
+    wide = solution.astype(np.longdouble)
+    start = 0
+    while start < matrix.shape[1]:
+        room = matrix.indptr[start] + EXTENDED
+        stop = max(start + 1, int(np.searchsorted(matrix.indptr, room, side="right")) - 1)
+        part = slice(matrix.indptr[start], matrix.indptr[stop])
+        columns = csc_array(
+            (
+                matrix.data[part].astype(np.longdouble),
+                matrix.indices[part],
+                matrix.indptr[start : stop + 1] - matrix.indptr[start],
+            ),
+            shape=(matrix.shape[0], stop - start),
+        )
+        if transposed:
+            rest[start:stop] -= np.asarray(columns.T @ wide)
+        else:
+            rest -= np.asarray(columns @ wide[start:stop])
+        start = stop
+    return rest.astype(float)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

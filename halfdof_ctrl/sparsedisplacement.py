@@ -51,9 +51,10 @@ class SparseEquation:
     @classmethod
     def of(cls, model: SecondOrderModel, partition: SparsePartition, rows: FloatArray) -> "SparseEquation":
         """Assemble the right-hand side, its rows scaled by the given factors."""
-        stiffness, drag = partition.mapped(as_sparse(model.K)), partition.mapped(as_sparse(model.C))
+        K, C = as_sparse(model.K), as_sparse(model.C)
         inertial, half = partition.of_kind(INERTIAL), partition.of_kind(HALF)
-        states = csc_array(hstack([stiffness[:, inertial], stiffness[:, half], drag[:, inertial]], format="csc"))
+        columns = [partition.mapped(matrix, own) for matrix, own in ((K, inertial), (K, half), (C, inertial))]
+        states = csc_array(hstack(columns, format="csc"))
         forces = [as_sparse(matrix) for matrix in (model.B, model.Bv, model.Ba)]
         while len(forces) > 1 and forces[-1].nnz == 0:
             forces.pop()

@@ -4,7 +4,9 @@ The matrix is equilibrated by powers of two. Where its pattern is nearly symmetr
 by minimum degree of ``W + W^T`` and takes its pivots from the diagonal, which leaves the fewest entries in the
 factors; that is as stable as elimination without pivoting is for the matrix at hand, for a stiffness very. What a test
 solution loses tells: where it is more than rounding, solutions are corrected once, and where it is much, pivots
-are chosen more strictly, in the end by columns with partial pivoting.
+are chosen more strictly, in the end by columns with partial pivoting. They are corrected too where W is so ill
+conditioned, as that of a slender structure is, that digits of the result are at stake: the residual is summed in
+extended precision, which brings back what the condition takes (N. J. Higham, 2002, chapter 12).
 
 What is factorized is the transpose, because the reduction solves with it, and SuperLU works many right-hand sides
 side by side for the matrix that it was given, but not for the transpose of that. Its small dense blocks gain nothing
@@ -23,14 +25,15 @@ from halfdof_ctrl.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots,
 from halfdof_ctrl.sparsearrays import (
     SparseMatrix,
     column_of_entries,
+    exact_residual,
     largest_by_row_and_column,
     times,
-    transposed_times,
 )
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
 WIDTH = 8  #: right-hand sides worked at a time
 REFINED = 2.0**-46  #: componentwise backward error of the test solution above which solutions are corrected once
+ILL_CONDITIONED = 2.0**-24  #: reciprocal condition number below which solutions are corrected once
 UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
 SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
 SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
@@ -71,6 +74,7 @@ class SparseLU:
         scaled = scaled_matrix(matrix, rows, columns)
         factors, corrected = _factorized(csc_array(scaled.T))
         rcond = 0.0 if factors is None else _reciprocal_condition(scaled, factors)
+        corrected = corrected or 0.0 < rcond < ILL_CONDITIONED
         return cls(scaled=scaled, rows=rows, columns=columns, factors=factors, corrected=corrected, rcond=rcond)
 
     @property
@@ -85,7 +89,10 @@ class SparseLU:
         return solution
 
     def solve_transposed(self, right: FloatArray) -> FloatArray:
-        """Give ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten."""
+        """Give ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
+
+        Where solutions are corrected, in extended precision: products in which terms cancel keep their digits.
+        """
         right *= self.columns[:, None]
         return self._solved(right, "N")
 
@@ -110,10 +117,11 @@ class SparseLU:
 
     def _solved(self, right: FloatArray, transposed: str) -> FloatArray:
         solution = self.factors.solve(right, trans=transposed)
-        if self.corrected:
-            product = (times if transposed == "T" else transposed_times)(self.scaled, solution)
-            solution += self.factors.solve(right - product, trans=transposed)
-        return np.asarray(solution)
+        if not self.corrected:
+            return np.asarray(solution)
+        rest = exact_residual(self.scaled, right, solution, transposed=transposed == "N")
+        correction = self.factors.solve(rest, trans=transposed)
+        return np.asarray(solution + correction.astype(np.longdouble if transposed == "N" else float))
 
 
 def largest_of_columns(matrix: FloatArray) -> FloatArray:

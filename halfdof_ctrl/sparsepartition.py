@@ -45,6 +45,7 @@ Mask = npt.NDArray[np.bool_]
 INERTIAL, HALF, STATIC = 0, 1, 2  #: kinds of columns
 LARGEST_BLOCK = 1000  #: columns of a connected part of M or C whose rank is decided by a singular value decomposition
 SETTLED = 1e-8  #: accuracy of the scaling in which masses are compared, squared residual over the first one
+LARGEST_GLANCE = 100  #: the same before W is factorized
 LARGEST_BASIS = 5000  #: DOFs up to which T is given as a dense matrix
 
 
@@ -109,6 +110,14 @@ class SparsePartition:
         return tuple([self.dofs[place] for place in places.tolist()])
 
     @cached_property
+    def _unit_columns(self) -> Mask:
+        """(n,) which columns of T are those of the identity."""
+        columns = as_sparse(sparse_unit(len(self.dofs))) if self.columns is None else self.columns
+        single = np.diff(columns.indptr) == 1
+        first = np.minimum(columns.indptr[:-1], columns.nnz - 1)
+        return np.asarray(single & (columns.indices[first] == np.arange(single.size)) & (columns.data[first] == 1.0))
+
+    @cached_property
     def _mixed_names(self) -> tuple[str, ...]:
         columns = as_sparse(sparse_unit(len(self.dofs))) if self.columns is None else self.columns
         single = (np.diff(columns.indptr) == 1) & (columns.max(axis=0).toarray().ravel() == 1.0)
@@ -149,9 +158,27 @@ class SparsePartition:
         """Give the positions of the coordinates of one kind."""
         return np.flatnonzero(self.kinds == kind)
 
-    def mapped(self, matrix: SparseMatrix) -> SparseMatrix:
-        """Give ``matrix T``, for n columns; entries that are rounding of a sum whose terms cancel are zero."""
-        return matrix if self.columns is None or self.sizes is None else cancelled(matrix, self.columns, self.sizes)
+    def mapped(self, matrix: SparseMatrix, which: IndexArray | None = None) -> SparseMatrix:
+        """Give ``matrix T``, for n columns, or those of its columns that `which` picks.
+
+        Entries that are rounding of a sum whose terms cancel are zero. Only the columns of T that are mixed are
+        multiplied: the others leave those of the matrix as they are.
+        """
+        product = matrix if which is None else csc_array(matrix[:, which])
+        if self.columns is None or self.sizes is None:
+            return product
+        places = np.arange(len(self.dofs)) if which is None else which
+        mixed = np.flatnonzero(~self._unit_columns[places])
+        if mixed.size == 0:
+            return product
+        own = cancelled(matrix, self.columns[:, places[mixed]], self.sizes[:, places[mixed]])
+        lengths = np.zeros(places.size, dtype=own.indptr.dtype)
+        lengths[mixed] = np.diff(own.indptr)
+        starts = np.concatenate([own.indptr[:1], np.cumsum(lengths, dtype=own.indptr.dtype)])
+        kept = csc_array(product, copy=True)
+        kept.data[~self._unit_columns[places][column_of_entries(kept)]] = 0.0
+        kept.eliminate_zeros()
+        return csc_array(kept + csc_array((own.data, own.indices, starts), shape=kept.shape))
 
     def to_coordinates(self, displacements: FloatArray) -> FloatArray:
         """Give ``p = T^-1 q`` for an (n, k) array."""
@@ -178,6 +205,24 @@ def select_sparse_columns(model: SecondOrderModel, tol: float | None = None) -> 
     return SparsePartition(
         method="selection", dofs=model.dofs, kinds=read_only(kinds), columns=None, sizes=None, evidence=()
     )
+
+
+def has_dependent_columns(model: SecondOrderModel, partition: SparsePartition) -> bool:
+    """Tell whether W by null columns is singular for sure, since columns of M or C in a small connected part depend.
+
+    Dampers and masses that act along slanted directions are of this kind. Seen here, it saves a factorization.
+    """
+    for matrix, kind in ((model.M, INERTIAL), (model.C, HALF)):
+        part = as_sparse(matrix)
+        for block in _linked_columns(part, partition.of_kind(kind)):
+            if block.size <= LARGEST_GLANCE:
+                linked = part[:, block]
+                dense = np.asarray(linked[np.unique(linked.indices)].toarray())
+                rows, columns = unit_free_factors(dense)
+                values = scipy.linalg.svd(dense * rows[:, None] * columns, compute_uv=False)
+                if values.size < block.size or values[-1] <= np.finfo(float).eps * values[0]:
+                    return True
+    return False
 
 
 def sparse_bases(model: SecondOrderModel, tol: float | None = None) -> SparsePartition:

@@ -22,10 +22,18 @@ from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.progress import progress_bar
 from halfdof_ctrl.signals import absorbed
-from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse, column_of_entries
+from halfdof_ctrl.sparsearrays import SparseMatrix, as_sparse
 from halfdof_ctrl.sparsedisplacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
 from halfdof_ctrl.sparselu import SparseLU, largest_of_columns
-from halfdof_ctrl.sparsepartition import SparsePartition, select_sparse_columns, sparse_bases
+from halfdof_ctrl.sparsepartition import (
+    HALF,
+    INERTIAL,
+    STATIC,
+    SparsePartition,
+    has_dependent_columns,
+    select_sparse_columns,
+    sparse_bases,
+)
 from halfdof_ctrl.threads import limited_threads
 
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
@@ -83,21 +91,23 @@ def _partitioned(
     """Take the first road whose W is nonsingular."""
     if method != "orthogonal":
         partition = select_sparse_columns(model, tol)
-        W = _leading_columns(model, partition)
-        leading = SparseLU.factorized(W)
-        if not leading.is_singular:
-            return partition, leading
-        if method == "selection":
-            raise _singular_error(model, partition, leading)
+        _require_states(model, partition)
+        if method == "selection" or not has_dependent_columns(model, partition):
+            leading = SparseLU.factorized(_leading_columns(model, partition))
+            if not leading.is_singular:
+                return partition, leading
+            if method == "selection":
+                raise _singular_error(model, partition, leading)
     partition = sparse_bases(model, tol)
+    _require_states(model, partition)
     leading = SparseLU.factorized(_leading_columns(model, partition))
     if leading.is_singular:
         raise _singular_error(model, partition, leading)
     return partition, leading
 
 
-def _leading_columns(model: SecondOrderModel, partition: SparsePartition) -> SparseMatrix:
-    """Assemble W, its columns in the order of the DOFs, where A and B have room."""
+def _require_states(model: SecondOrderModel, partition: SparsePartition) -> None:
+    """Refuse an A or B that is too large."""
     n_i, n_c = partition.n_inertial, partition.n_half
     N, m = 2 * n_i + n_c, len(model.inputs)
     require_room(
@@ -108,15 +118,23 @@ def _leading_columns(model: SecondOrderModel, partition: SparsePartition) -> Spa
         "descriptor_response and bode_plot take the model as it is.",
     )
     require_room(N, m, "B", "Select the inputs that matter: model.select(inputs=[...]).")
-    parts = [partition.mapped(as_sparse(matrix)) for matrix in (model.M, model.C, model.K)]
-    data, rows, columns = [], [], []
-    for kind, part in enumerate(parts):
-        column = column_of_entries(part)
-        own = partition.kinds[column] == kind
-        data.append(part.data[own])
-        rows.append(part.indices[own])
-        columns.append(column[own])
-    return csc_array((np.concatenate(data), (np.concatenate(rows), np.concatenate(columns))), shape=parts[0].shape)
+
+
+def _leading_columns(model: SecondOrderModel, partition: SparsePartition) -> SparseMatrix:
+    """Assemble W, its columns in the order of the DOFs."""
+    places = [partition.of_kind(kind) for kind in (INERTIAL, HALF, STATIC)]
+    matrices = as_sparse(model.M), as_sparse(model.C), as_sparse(model.K)
+    parts = [partition.mapped(matrix, own) for matrix, own in zip(matrices, places, strict=True)]
+    lengths = np.empty(len(model.dofs) + 1, dtype=np.int64)
+    lengths[0] = 0
+    for part, own in zip(parts, places, strict=True):
+        lengths[own + 1] = np.diff(part.indptr)
+    starts = np.cumsum(lengths)
+    data, rows = np.empty(starts[-1]), np.empty(starts[-1], dtype=np.int32)
+    for part, own in zip(parts, places, strict=True):
+        into = np.repeat(starts[own] - part.indptr[:-1], np.diff(part.indptr)) + np.arange(part.nnz)
+        data[into], rows[into] = part.data, part.indices
+    return csc_array((data, rows, starts.astype(np.int32)), shape=matrices[0].shape)
 
 
 def _singular_error(

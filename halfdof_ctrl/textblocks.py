@@ -18,6 +18,9 @@ from halfdof_ctrl.errors import FileFormatError
 BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
 NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
+TAIL = 4096  #: bytes at the end of a text that are looked at
+FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
+WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
 TOO_LONG = "a line has more than its fields"
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
@@ -93,6 +96,22 @@ def printable(text: bytes) -> str:
     """
     words = text.decode("latin-1").strip(" \0\r\n\t")
     return "".join([letter if letter.isprintable() else "?" for letter in words])
+
+
+def is_cut_short(content: bytes) -> bool:
+    r"""Tell whether the last number of a text without a last line end has lost digits for sure.
+
+    So it is where the numbers that end the lines before it all have one length and it has less.
+
+    >>> is_cut_short(b"1, 2.50000000e+01\n2, 1.25000000e+02\n3, 3.00000000e+00\n4, 1.5000")
+    True
+    """
+    lines = content[-TAIL:].split(b"\n")
+    ends = [line.split()[-1].lstrip(b"+-") for line in lines[1:] if line.strip()]
+    if content.endswith((b"\n", b"\r")) or b"\0" in content[-TAIL:] or len(ends) <= FEWEST_LINES:
+        return False
+    lengths = {len(end) for end in ends[:-1]}
+    return len(lengths) == 1 and lengths.pop() > max(len(ends[-1]), WRITTEN_FULL)
 
 
 def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Sequence[int]) -> FloatArray:

@@ -16,6 +16,7 @@ Derivation: docs/explanation/truncation.md.
 
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.linalg
@@ -29,7 +30,7 @@ from halfdof_ctrl.errors import (
     TruncationWarning,
     callers_level,
 )
-from halfdof_ctrl.model import LETTERS, SecondOrderModel
+from halfdof_ctrl.model import LETTERS, SecondOrderModel, mechss
 from halfdof_ctrl.modes import is_unsymmetric
 from halfdof_ctrl.names import listed
 from halfdof_ctrl.projection import projected
@@ -38,6 +39,9 @@ from halfdof_ctrl.threads import limited_threads
 
 POINTS = 12  #: frequencies at which the error is measured, besides resonances
 RESONANCES = 6  #: lowest resonances of the small model at which the error is measured
+DOUBTFUL = 4  #: frequencies where most is expected of it, at which it is measured too
+CANDIDATES = 200  #: frequencies among which these are looked for
+EFFORT = 4e10  #: cubes of the small model's size that this may take
 DECADES = 2.0  #: of the band below its upper end
 ALLOWED = 0.05  #: error relative to a channel's largest value above which a warning is given
 
@@ -55,7 +59,8 @@ class TruncatedModel(SecondOrderModel):
     mode_frequencies: FloatArray  #: (k,) of the modes that were kept, with these DOFs held [Hz]
     band: tuple[float, float]  #: lowest and highest frequency at which the error was measured [Hz]
     checked: FloatArray  #: (l,) frequencies at which it was measured [Hz]
-    errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value there
+    errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value
+    #: between resonances, and at resonances to its largest of all
 
     @property
     def max_error(self) -> float:
@@ -96,7 +101,8 @@ def truncate_modes(
     n_modes : int, optional
         Number of modes to keep, in the place of `f_max`; the band then reaches to half the highest of them.
     points : int
-        Frequencies at which the full model is factorized to measure the error; up to six resonances come on top.
+        Frequencies at which the full model is factorized to measure the error; up to ten come on top: resonances,
+        and where most is expected of the error.
 
     Returns
     -------
@@ -202,13 +208,16 @@ def _measured(
 ) -> TruncatedModel:
     """Compare with the full model over the band."""
     low = top / 10.0**DECADES
-    frequencies = np.union1d(np.geomspace(low, top, points), _resonances(small, low, top))
+    peaks = _resonances(small, low, top)
+    smooth = np.union1d(np.geomspace(low, top, points), _doubtful(small, motions, low, top))
+    frequencies = np.union1d(smooth, peaks)
     s = 2j * np.pi * frequencies
     found, desired = small(s, squeeze=False), model(s, squeeze=False)
     sound = np.isfinite(found) & np.isfinite(desired)
     difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
-    largest = size.max(axis=2, keepdims=True)
-    errors = difference / np.where(largest > 0.0, largest, max(float(size.max(initial=0.0)), np.finfo(float).tiny))
+    errors = _relative(difference, size)
+    elsewhere = np.isin(frequencies, smooth)  # or a sharp peak would make all errors beside it look small
+    errors[:, :, elsewhere] = _relative(difference[:, :, elsewhere], size[:, :, elsewhere])
     fields = {letter: getattr(small, letter) for letter in LETTERS}
     truncated = TruncatedModel(
         **fields,
@@ -229,6 +238,34 @@ def _measured(
         msg = f"The small model is not close to the full one:{said[-2]};{said[-1]}. Raise f_max or n_modes."
         warnings.warn(" ".join(msg.split()), TruncationWarning, stacklevel=callers_level())
     return truncated
+
+
+def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
+    """Give (p, m, l) differences relative to the largest size of each channel, of all where a channel is zero."""
+    largest = size.max(axis=2, keepdims=True)
+    every = max(float(size.max(initial=0.0)), float(np.finfo(float).tiny))
+    return np.asarray(difference / np.where(largest > 0.0, largest, every))
+
+
+def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
+    """Give frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
+    count = min(CANDIDATES, int(EFFORT / len(small.dofs) ** 3))
+    above = motions.kept.size + np.flatnonzero(motions.omega > 2.0 * np.pi * top)
+    if count < DOUBTFUL or above.size == 0:
+        return np.zeros(0)
+    rest = np.setdiff1d(np.arange(len(small.dofs)), above)
+    parts: dict[str, Any] = {letter: getattr(small, letter)[np.ix_(rest, rest)] for letter in "MCK"}
+    parts |= {letter: getattr(small, letter)[rest] for letter in ("B", "Bv", "Ba")}
+    parts |= {letter: getattr(small, letter)[:, rest] for letter in ("F", "G", "H")}
+    fewer = mechss(**parts, D=small.D, Dv=small.Dv, Da=small.Da)
+    frequencies = np.geomspace(low, top, count)
+    s = 2j * np.pi * frequencies
+    found, desired = fewer(s, squeeze=False), small(s, squeeze=False)
+    sound = np.isfinite(found) & np.isfinite(desired)
+    difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
+    expected = _relative(difference, size).max(axis=(0, 1))
+    peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
+    return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL]]])
 
 
 def _resonances(small: SecondOrderModel, low: float, top: float) -> FloatArray:

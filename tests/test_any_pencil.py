@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 from anykinds import (
     ANY_KIND,
+    Kind,
     chain,
     combined,
     constrained,
@@ -18,12 +19,14 @@ from anykinds import (
     floating,
     holonomic,
     in_units,
+    mixed,
     redundant,
+    signals,
 )
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
 from rational import RationalTransfer, free_dofs, pencil_index, rational_transfer
-from structures import Structure, structures
+from structures import Structure, rank_deficient, structures
 from verdict import (
     Improved,
     characteristic_error,
@@ -188,6 +191,36 @@ def test_eigenvalues_are_those_of_the_exact_determinant(structure: Structure) ->
     reduction, exact = regular(structure.model())
     assert characteristic_error(reduction.A, exact, POINTS) <= CHARACTERISTIC
     assert eigenvalue_error(reduction.A, exact) <= EIGENVALUE
+
+
+HARD = (  # dense blocks of several steps, or far out ill conditioned: floating point alone cannot tell
+    (rank_deficient, 12, 81008307),
+    (mixed, 4, 81003631),
+    (mixed, 11, 62000735),
+    (mixed, 11, 71000783),
+    (mixed, 12, 71001311),
+    (mixed, 21, 95000767),
+)
+
+
+@pytest.mark.parametrize(("kind", "size", "seed"), HARD)
+def test_hard_models_are_neither_refused_nor_wrong(kind: Kind, size: int, seed: int) -> None:
+    """Order, transfer function, polynomial part and improper pairs of models found by search."""
+    generator = np.random.default_rng([seed, size])
+    model = signals(generator, kind(generator, size))
+    exact, (reduction, _) = rational_transfer(model), reduced_aloud(model)
+    assert reduction.order == exact.order
+    assert errors(complete(reduction), exact).max() <= TRANSFER
+    assert polynomial_error(reduction.polynomial_part, exact.polynomial_part()) <= COEFFICIENT
+    growth = exact.growth
+    assert pairs(reduction) == {(j, i, int(growth[i, j])) for i, j in np.argwhere(growth > 0).tolist()}
+
+
+def test_singular_pencil_that_floating_point_cannot_tell_is_refused_as_such() -> None:
+    """An exactly singular dense model is called singular, not uncertain."""
+    generator = np.random.default_rng([34000831, 11])
+    with pytest.raises(SingularPencilError, match="The pencil is singular"):
+        reduced(mixed(generator, 11).model())
 
 
 POWERS = st.lists(st.integers(-9, 9), min_size=12, max_size=12)

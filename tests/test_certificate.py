@@ -13,7 +13,7 @@ from test_deflation import realization
 
 from halfdof_ctrl import SecondOrderModel, mechss
 from halfdof_ctrl.certificate import AXIS, Losses, ScaledPencil
-from halfdof_ctrl.relaxation import scaled_rows
+from halfdof_ctrl.rowsystems import scaled_rows
 from halfdof_ctrl.signals import Signal, StateEquations
 
 FloatArray = npt.NDArray[np.float64]

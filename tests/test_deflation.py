@@ -12,7 +12,8 @@ from test_relaxation import SEEDS, USUAL, drawn
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
 from halfdof_ctrl.deflation import Realization, in_model_units, realized, rounding_in_model_units
-from halfdof_ctrl.relaxation import Units, relaxed, scaled_rows
+from halfdof_ctrl.relaxation import relaxed
+from halfdof_ctrl.rowsystems import Units, scaled_rows
 from halfdof_ctrl.signals import StateEquations
 
 ComplexArray = npt.NDArray[np.complex128]

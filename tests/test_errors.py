@@ -100,6 +100,13 @@ def test_whatever_a_reader_raises_becomes_one_refusal_that_names_the_file(
     assert (caught.value.path, caught.value.line, caught.value.__cause__) == ("a.mtx", line, cause)
 
 
+def test_what_a_reader_says_at_length_is_cut() -> None:
+    """Some quote the bytes that they do not understand."""
+    with pytest.raises(FileFormatError, match=r"x\.\.\.\)\. Write it anew") as caught, naming_the_file("a.npz"):
+        raise KeyError("x" * 5000)
+    assert len(str(caught.value)) < 500
+
+
 def test_a_missing_extra_stays_one_and_an_os_error_too() -> None:
     """Neither is a fault of the file."""
     with pytest.raises(MissingExtraError, match=r"a\.mat: needs h5py"), naming_the_file("a.mat"):

@@ -349,3 +349,13 @@ def test_a_file_without_a_last_line_end_is_doubted(tmp_path: Path) -> None:
     (tmp_path / "job_STIF1.mtx").write_text(abaqus(K)[:-1])
     with pytest.warns(ImportedModelWarning, match=r"job_STIF1\.mtx does not end with a line end"):
         load_model({"K": tmp_path / "job_STIF1.mtx"})
+
+
+def test_a_last_number_with_fewer_digits_than_the_others_is_refused(tmp_path: Path) -> None:
+    """All numbers of a format have one length, so a shorter last one without a line end was cut."""
+    rows = [f"{row},1, {row},1, {2.0e4 * row:.14e}" for row in range(1, 6)]
+    whole = "\n".join(rows)
+    for end in range(1, 12):
+        (tmp_path / "job_STIF1.mtx").write_text(whole[:-end])
+        with pytest.raises(FileFormatError, match="fewer digits than those before it"):
+            load_model({"K": tmp_path / "job_STIF1.mtx"})

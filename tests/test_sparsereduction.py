@@ -12,7 +12,7 @@ from fe_models import space_frame, spring_grid
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy.sparse import block_diag, csc_array, csr_matrix, diags_array
+from scipy.sparse import block_diag, coo_array, csc_array, csr_matrix, diags_array
 from scipy.sparse.linalg import splu
 from structures import Structure, on_axis, structures
 
@@ -206,6 +206,36 @@ def test_frames_and_grids_agree_with_other_solves(structure: Any) -> None:  # no
     mass = np.sqrt(structure.M.diagonal()[places])
     exact_values = np.sort(1.0 / np.sqrt(np.linalg.eigvalsh(mass[:, None] * flexibility * mass)))
     assert_allclose(found, exact_values, rtol=AT_SIZE)
+
+
+@pytest.mark.skipif(bool(np.finfo(np.longdouble).eps > 1e-18), reason="a long double is a double on this machine")
+def test_a_slender_beam_keeps_the_digits_that_its_condition_takes() -> None:
+    """A cantilever of 1000 elements without mass (rcond 3e-12) under a tip mass of 1 kg: ``k = 3 EI / L^3``."""
+    n = 1000
+    element = np.array([[12.0, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]])
+    places = 2 * np.arange(n)[:, None] + np.arange(4)
+    entries = np.tile(element.ravel(), n), (np.repeat(places, 4, axis=1).ravel(), np.tile(places, (1, 4)).ravel())
+    K = csc_array(csc_array(coo_array(entries, shape=(2 * n + 2, 2 * n + 2)))[2:, 2:])
+    tip = 2 * n - 2
+    M = csc_array(([1.0], ([tip], [tip])), shape=K.shape)
+    A = mech2ss(mechss(M, None, K).select(f"F_q{tip}", f"q{tip}")).A
+    assert_allclose(-A[1, 0], 3.0 / n**3, rtol=1e-8)  # 1.6e-6 off without corrections in extended precision
+
+
+def test_slanted_dampers_take_a_single_factorization(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Columns of C depend where a damper acts along no axis, which is seen before W is factorized by null columns."""
+    structure = space_frame(4, 3, 4, 6, parts=2, dampers=0)
+    damped = np.setdiff1d(np.arange(structure.size), structure.massive)[:3]
+    along = csc_array(([0.6, 0.64, 0.48], (damped, [0, 0, 0])), shape=(structure.size, 1))
+    model = mechss(structure.M, 40.0 * (along @ along.T), structure.K).select("F_q0", f"q{damped[0]}")
+    used: list[str] = []
+    monkeypatch.setattr(SparseLU, "factorized", _noting(used, "factorized", SparseLU.factorized))
+    reduction = exact_reduction(model)
+    assert reduction.partition.method == "orthogonal"
+    assert len(reduction.partition.half) == 1
+    assert used == ["factorized"]
+    desired = model.as_dense()(POINTS, squeeze=False)
+    assert_allclose(response(mech2ss(reduction)), desired, rtol=0.0, atol=TRANSFER * np.abs(desired).max())
 
 
 def test_a_singular_small_model_takes_the_dense_roads() -> None:
