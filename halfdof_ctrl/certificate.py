@@ -21,11 +21,12 @@ from halfdof_ctrl.signals import StateEquations
 from halfdof_ctrl.spectrum import balanced_states
 
 NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
+EPS = float(np.finfo(float).eps)
 LARGEST_EXACT = 60  #: equations up to which determinants may be formed in integers
 DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
-SINGULAR = 64 * float(np.finfo(float).eps)  #: times n: P(s) is singular below this ratio of singular values
+SINGULAR = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
 AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
-DOUBT = 4 * float(np.finfo(float).eps)  #: times n and the condition of P(s): differences that a direct solve may make
+DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,6 +101,31 @@ class ScaledPencil:
             if output.any() and lost > DOUBT * len(matrix) * doubt:
                 worst = max(worst, lost / float(np.abs(output).max()))
         return Losses(size, error, worst)
+
+    def expected_loss(self, equations: StateEquations) -> float:
+        """Bound what rounding A and B to double precision makes of the outputs, relative to the largest, at AXIS.
+
+        Entry by entry, ``eps |F X (s I - A)^-1| (|A| |x| + |B|)``: the same in any units of the states, and, unlike a
+        measured error, the same for models that differ by rounding.
+        """
+        N = len(equations.A)
+        A, factors = balanced_states(equations.A)
+        into, X = equations.B / factors[:, None], equations.displacement.X * factors
+        worst = 0.0
+        for s in AXIS:
+            F, unit = _at(self.F, s), np.eye(N)
+            try:
+                inverse = np.linalg.solve(s * unit - A, unit + 0j)
+            except np.linalg.LinAlgError:  # an eigenvalue
+                continue
+            x, through = inverse @ into, F @ X @ inverse
+            output = through @ into + _at(self.D, s)
+            for power, part in enumerate(equations.displacement.U):
+                output = output + s**power * F @ part
+            error = EPS * np.abs(through) @ (np.abs(A) @ np.abs(x) + np.abs(into))
+            if output.any():
+                worst = max(worst, float(error.max(initial=0.0)) / float(np.abs(output).max()))
+        return worst
 
     def _scaled(self, s: complex) -> ComplexArray:
         P, _ = self.at(s)

@@ -110,6 +110,17 @@ def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
 
 def loss(model: SecondOrderModel, equations: StateEquations) -> float:
     """Measure what state equations, from whatever road, lose against direct solves."""
+    pencil, scaled = _in_scaled_units(model, equations)
+    return pencil.losses(scaled).worst
+
+
+def expected_loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Bound what state equations, from whatever road, lose by being rounded."""
+    pencil, scaled = _in_scaled_units(model, equations)
+    return pencil.expected_loss(scaled)
+
+
+def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
     _, units, pencil = _scaled(model)
     q, across = equations.displacement, units.inputs / units.columns[:, None]
     scaled = StateEquations(
@@ -120,7 +131,7 @@ def loss(model: SecondOrderModel, equations: StateEquations) -> float:
         ),
         shift=(),
     )
-    return pencil.losses(scaled).worst
+    return pencil, scaled
 
 
 def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:

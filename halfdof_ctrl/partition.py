@@ -226,7 +226,9 @@ def slowest_speed(model: SecondOrderModel) -> float:
     return float(np.exp2(time_log([model.K, model.C, model.M])))
 
 
-def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofPartition:
+def orthonormal_bases(
+    model: SecondOrderModel, tol: float | None = None, *, widest: float = float("inf")
+) -> DofPartition:
     """Split the motion into null(M) with null(C), the rest of null(M), and what is left.
 
     Parameters
@@ -236,6 +238,9 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
     tol : float, optional
         Singular values of an equilibrated block at most `tol` times its largest count as zero; by
         default 16 eps times the block's size.
+    widest : float, optional
+        A block whose singular values lie further apart than this is mixed although none of them is zero, so that
+        directions of little mass stand alone and M T has columns that are far from each other.
 
     Returns
     -------
@@ -247,9 +252,9 @@ def orthonormal_bases(model: SecondOrderModel, tol: float | None = None) -> DofP
     row_logs, column_logs, time = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
     rows, columns = np.exp2(row_logs)[:, None], np.exp2(column_logs)
     mass, damping = [rows * np.exp2(k * time) * matrix * columns for k, matrix in ((2.0, model.M), (1.0, model.C))]
-    massive, massless, first = _null_split("M", mass, _Span(unit, unit), model.dofs, tol)
+    massive, massless, first = _null_split("M", mass, _Span(unit, unit), model.dofs, tol, widest)
     drag = cancelled(damping, massless.columns, massless.sizes)
-    half, static, second = _null_split("C", drag, massless, model.dofs, tol)
+    half, static, second = _null_split("C", drag, massless, model.dofs, tol, widest)
     basis = np.hstack([massive.columns, half.columns, static.columns]) * columns[:, None]
     sizes = np.hstack([massive.sizes, half.sizes, static.sizes]) * columns[:, None]
     lengths = lengths_of_columns(basis)
@@ -310,7 +315,7 @@ class _Span:
 
 
 def _null_split(
-    letter: Literal["M", "C"], product: FloatArray, span: _Span, dofs: tuple[str, ...], tol: float | None
+    letter: Literal["M", "C"], product: FloatArray, span: _Span, dofs: tuple[str, ...], tol: float | None, widest: float
 ) -> tuple[_Span, _Span, list[RankDecision]]:
     """Split a span of d vectors into a part where `product` (n, d) has full rank and its null space.
 
@@ -339,10 +344,10 @@ def _null_split(
                 matrix=letter, dofs=concerned, singular_values=values, rank=rank, bound=float(bound * values[0])
             )
         )
-        if rank == block.size:
+        spread = float(values[0] / values[rank - 1]) if rank else 1.0
+        if rank == block.size and spread <= widest:
             ranging.append(own)
             continue
-        spread = values[0] / values[rank - 1]
         speck = 4 * max(part.shape) * np.finfo(float).eps * spread
         clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
         mixed = own.columns @ (factors[:, None] * clean)

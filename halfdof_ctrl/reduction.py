@@ -24,7 +24,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.arrays import LARGEST_DENSE_COPY, FloatArray, Matrix, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.deflationroad import StateSelection, deflated, has_spectrum, loss
+from halfdof_ctrl.deflationroad import StateSelection, deflated, expected_loss, has_spectrum, loss
 from halfdof_ctrl.errors import (
     CloseDecisionWarning,
     ComplexModelError,
@@ -64,6 +64,8 @@ SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by eq
 LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves ...
 LOSS_LOOKED_FOR = 1e-3  #: ... and in models that are cheap to solve W with a smaller rcond than this
 CHEAP = 60  #: DOFs of these models
+SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
+SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LARGEST_CERTIFIED = 500  #: DOFs up to which a sparse model with mixed coordinates is reduced densely
 LOST = 1e-9  #: a state space that loses more than this against a direct solve is warned of
 
@@ -320,7 +322,8 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         deflation. By default only exact zeros and rounding count as none.
     method : {"selection", "orthogonal", "deflation"}, optional
         Road to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
-        deflation where they do too (index above one).
+        deflation where they do too (index above one). The default also takes orthonormal bases where DOFs as
+        states would lose digits that those keep.
 
     Returns
     -------
@@ -431,7 +434,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
             reduction = _reduced(model, partition, leading, tol)
             sure = method == "selection" or tol is not None or leading.rcond > SURELY_REGULAR
             if sure or has_spectrum(model, reduction.A):
-                return _warned(reduction)
+                return _warned(reduction, method)
         elif method == "selection":
             raise _singular_error(model, partition, W, leading)
     partition = orthonormal_bases(model, tol)
@@ -441,7 +444,7 @@ def _by_leading_matrix(model: SecondOrderModel, tol: float | None, method: Road 
         reduction = _reduced(model, partition, leading, tol)
         sure = method == "orthogonal" or tol is not None
         if sure or has_spectrum(model, reduction.A):  # bases of null spaces rest on rank decisions
-            return _warned(reduction)
+            return _warned(reduction, method)
     elif method == "orthogonal":
         raise _singular_error(model, partition, W, leading)
     return None
@@ -460,8 +463,8 @@ def _reduced(
     )
 
 
-def _warned(reduction: ExactReduction) -> ExactReduction:
-    """Warn of close decisions behind a W that is taken as nonsingular."""
+def _warned(reduction: ExactReduction, method: Road | None) -> ExactReduction:
+    """Warn of close decisions behind a W that is taken as nonsingular, and of lost digits that no coordinates save."""
     _warn_of_close_decisions(reduction.partition.evidence)
     if reduction.rcond < CLOSE * len(reduction.model.dofs) * SINGULAR:
         msg = (
@@ -472,8 +475,25 @@ def _warned(reduction: ExactReduction) -> ExactReduction:
     equations = reduction.equations
     suspect = LOSS_LOOKED_FOR if len(reduction.model.dofs) <= CHEAP else LOSS_SUSPECTED
     if reduction.rcond < suspect and reduction.tol is None and not isinstance(equations, SparseReduction):
-        _warn_of_lost_digits(loss(reduction.model, equations), reduction.rcond)
+        if method is None:
+            reduction = _in_better_coordinates(reduction, equations)
+        _warn_of_lost_digits(loss(reduction.model, reduction.equations), reduction.rcond)  # type: ignore[arg-type]
     return reduction
+
+
+def _in_better_coordinates(reduction: ExactReduction, equations: StateEquations) -> ExactReduction:
+    """Give directions of little mass coordinates of their own, where that keeps digits that DOFs lose."""
+    model, lost = reduction.model, expected_loss(reduction.model, equations)
+    if lost <= LOST:
+        return reduction
+    partition = orthonormal_bases(model, widest=SPREAD)
+    leading = LeadingMatrix.factorized(leading_columns(model, partition))
+    if leading.is_singular or len(partition.states) != reduction.order:
+        return reduction
+    solved = solved_at_once(model, partition, leading)
+    if expected_loss(model, solved) > SAVED * lost:
+        return reduction
+    return replace(reduction, partition=partition, leading=leading, equations=solved, rcond=leading.rcond)
 
 
 def _by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:

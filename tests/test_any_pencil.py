@@ -26,7 +26,7 @@ from anykinds import (
 from hypothesis import Phase, assume, given, settings
 from hypothesis import strategies as st
 from rational import RationalTransfer, free_dofs, pencil_index, rational_transfer
-from structures import Structure, rank_deficient, structures
+from structures import Structure, gyroscopic, passive, rank_deficient, structures
 from verdict import (
     Improved,
     characteristic_error,
@@ -214,6 +214,35 @@ def test_hard_models_are_neither_refused_nor_wrong(kind: Kind, size: int, seed: 
     assert polynomial_error(reduction.polynomial_part, exact.polynomial_part()) <= COEFFICIENT
     growth = exact.growth
     assert pairs(reduction) == {(j, i, int(growth[i, j])) for i, j in np.argwhere(growth > 0).tolist()}
+
+
+ILL_CONDITIONED = (  # M is regular, but nearly singular in some direction across DOFs
+    (passive, 4, 10189397),
+    (passive, 7, 34000512),
+    (passive, 8, 81008272),
+    (gyroscopic, 9, 71000164),
+    (floating, 5, 51000411),
+)
+
+
+@pytest.mark.parametrize(("kind", "size", "seed"), ILL_CONDITIONED)
+def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size: int, seed: int) -> None:
+    """States that are DOFs lose up to six digits of H(s) there; those of the default road do not, without a warning."""
+    generator = np.random.default_rng([seed, size])
+    model = signals(generator, kind(generator, size))
+    exact, (reduction, lost) = rational_transfer(model), reduced_aloud(model)
+    assert reduction.method == "orthogonal"
+    assert not lost
+    assert errors(complete(reduction), exact).max() <= 1e-9
+
+
+def test_asking_for_a_road_keeps_its_coordinates() -> None:
+    """With ``method="selection"`` the states are DOFs, and the lost digits are told."""
+    generator = np.random.default_rng([34000512, 7])
+    model = signals(generator, passive(generator, 7))
+    with pytest.warns(LostDigitsWarning, match="lose"):
+        reduction = exact_reduction(model, method="selection")
+    assert set(reduction.partition.inertial) <= set(model.dofs)
 
 
 def test_singular_pencil_that_floating_point_cannot_tell_is_refused_as_such() -> None:

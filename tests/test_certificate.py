@@ -8,11 +8,12 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from mechanisms import blade, derivatives, hanging_chain, rod
 from numpy.testing import assert_allclose
-from structures import Structure, structures
+from structures import Structure, rank_deficient, structures
 from test_deflation import realization
 
-from halfdof_ctrl import SecondOrderModel, mechss
+from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
 from halfdof_ctrl.certificate import AXIS, Losses, ScaledPencil
+from halfdof_ctrl.deflationroad import has_spectrum
 from halfdof_ctrl.rowsystems import scaled_rows
 from halfdof_ctrl.signals import Signal, StateEquations
 
@@ -131,6 +132,41 @@ def test_point_at_an_eigenvalue_is_left_out() -> None:
     pencil = ScaledPencil(P=P, B=np.array([[[1.0]], [[0.0]], [[0.0]]]), F=P * 0 + [[[1]], [[0]], [[0]]], D=P * 0.0)
     A = np.array([[0.0, 1.0], [-stiffness, 0.0]])
     displacement = Signal(np.array([[1.0, 0.0]]), ())
-    losses = pencil.losses(StateEquations(A=A, B=np.array([[0.0], [1.0]]), displacement=displacement, shift=()))
+    equations = StateEquations(A=A, B=np.array([[0.0], [1.0]]), displacement=displacement, shift=())
+    losses = pencil.losses(equations)
     assert losses.worst < 1e-14
+    assert pencil.expected_loss(equations) < 1e-14
     assert 0.0 < losses.size[0] < 2.0
+
+
+def test_expected_loss_is_that_of_the_last_digits() -> None:
+    """``x' = -x + u`` with ``q = x``: two roundings of size eps at |1/(1 + s)|, the first point counts most."""
+    pencil = pencil_of(mechss([[0]], [[1]], [[1]]))
+    equations = equations_of(mechss([[0]], [[1]], [[1]]))
+    found = pencil.expected_loss(equations)
+    s = AXIS[0]
+    desired = np.finfo(float).eps * (abs(1 / (1 + s)) + 1.0)
+    assert_allclose(found, desired, rtol=1e-12)
+
+
+@pytest.mark.parametrize("model", MECHANISMS, ids=NAMES)
+def test_expected_loss_is_free_of_the_states_units(model: SecondOrderModel) -> None:
+    """States in other units change no digit of it."""
+    pencil, right = pencil_of(model), equations_of(model)
+    units = 2.0 ** np.arange(-20, -20 + 3 * len(right.A), 3)
+    other = StateEquations(
+        A=right.A * units / units[:, None],
+        B=right.B / units[:, None],
+        displacement=Signal(right.displacement.X * units, right.displacement.U),
+        shift=(),
+    )
+    assert_allclose(pencil.expected_loss(other), pencil.expected_loss(right), rtol=1e-6)
+
+
+def test_determinant_far_out_is_exact_where_floating_point_does_not_know_it() -> None:
+    """A dense mass of rank 4 among 12 DOFs: P(s) has rcond 1e-17 beyond the fastest pole, and the right A passes."""
+    generator = np.random.default_rng([81008307, 12])
+    model = rank_deficient(generator, 12).model()
+    A = exact_reduction(model, method="orthogonal").A
+    assert has_spectrum(model, A)
+    assert not has_spectrum(model, np.block([[A, np.zeros((len(A), 1))], [np.zeros((1, len(A))), -np.ones((1, 1))]]))
