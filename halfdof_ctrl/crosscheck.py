@@ -17,8 +17,6 @@ from typing import Any
 import control
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
-import scipy.optimize
 
 from halfdof_ctrl.arrays import ComplexArray, FloatArray, powers_of_two, read_only
 from halfdof_ctrl.densecopy import dense_copy
@@ -26,13 +24,13 @@ from halfdof_ctrl.descriptor import pencil_structure, require_regular, typical_f
 from halfdof_ctrl.errors import MatrixError, ParameterError
 from halfdof_ctrl.evaluation import quadratic_rounding
 from halfdof_ctrl.model import SecondOrderModel
+from halfdof_ctrl.polecheck import POLE_TOLERANCE, compare_poles, in_words
 from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
 from halfdof_ctrl.secondopinion import second_opinion
 from halfdof_ctrl.spectrum import ROUNDING, balanced_states, eigenvalues_and_rounding
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
-POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding in A may move it
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
 SMALL = 1e-6  #: of the largest or of the typical frequency: eigenvalues below may stand for one at the origin
 EPS = float(np.finfo(float).eps)
@@ -164,7 +162,7 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     gamma = typical_frequency(model)
     moving = _moving(finite, system.A, gamma)
     transfer = _compare_transfer(model, system, sys, moving)
-    pole_error, pole_worst = _compare_poles(system.A, finite, gamma)
+    pole_error, pole_worst = compare_poles(model, system.A, finite, gamma)
     step_error, step_worst, horizon = _compare_steps(model, system, moving, transfer.unclear, structure.index)
     return CrossCheck(
         order=sys.nstates,
@@ -239,7 +237,7 @@ def _compare_transfer(
     by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
-    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {_in_words(points[k])}"
+    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {in_words(points[k])}"
     with np.errstate(divide="ignore", invalid="ignore"):
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
     evaluated = np.asarray(sys(points, squeeze=False, warn_infinite=False))
@@ -282,29 +280,6 @@ def _points(moving: ComplexArray) -> ComplexArray:
     points = np.concatenate([1j * grid, at_poles, at_sizes, off_axis])
     near = np.abs(points[:, None] - moving).min(axis=1) < CLEARANCE * np.abs(points)
     return np.where(near, points + CLEARANCE * np.abs(points), points)
-
-
-def _compare_poles(A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[float, str]:
-    """Match the poles one to one and find the worst of them.
-
-    Where the descriptor form has several eigenvalues near the origin, rounding splits them by its square root, in
-    A as in QZ.
-    """
-    if A.shape[0] != finite.size:
-        return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
-    if finite.size == 0:
-        return 0.0, "no poles"
-    poles, rounding = eigenvalues_and_rounding(A)
-    rows, columns = scipy.optimize.linear_sum_assignment(np.abs(poles[:, None] - finite))
-    difference = np.abs(poles[rows] - finite[columns])
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        allowed = np.abs(finite[columns]) + (rounding[rows] + ROUNDING * gamma) / POLE_TOLERANCE
-        small = _is_small(finite[columns], gamma)
-        if np.count_nonzero(small) > 1:
-            allowed[small] += np.sqrt(ROUNDING) * max(float(np.linalg.norm(A, 2)), gamma) / POLE_TOLERANCE
-        errors = np.where(difference > 0.0, difference / allowed, 0.0)
-    worst = int(np.argmax(errors))
-    return float(errors[worst]), f"pole {_in_words(poles[rows][worst])}"
 
 
 def _compare_steps(
@@ -370,10 +345,3 @@ def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
 def _place_of_largest(errors: FloatArray) -> tuple[int, int, int]:
     i, j, k = np.unravel_index(int(np.argmax(errors)), errors.shape)
     return int(i), int(j), int(k)
-
-
-def _in_words(s: complex) -> str:
-    """Write a complex frequency with four digits."""
-    if s.imag == 0.0:
-        return f"{s.real:.4g}"
-    return f"{s.real:.4g}{s.imag:+.4g}j" if s.real != 0.0 else f"{s.imag:.4g}j"

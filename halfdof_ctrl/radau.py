@@ -92,14 +92,20 @@ def descriptor_step_response(model: SecondOrderModel, plan: Sequence[Segment]) -
     E = np.block([[unit, zero], [zero, model.M]])
     A = np.block([[zero, unit], [-model.K, -model.C]])
     b = np.vstack([np.zeros_like(model.B), model.B])
-    x = np.zeros_like(b)
-    outputs = []
+    at_end, of_slope = np.hstack([model.F, model.G]), np.hstack([np.zeros_like(model.H), model.H])
+    outputs = np.empty((*model.D.shape, sum(segment.steps for segment in plan)))
+    x, done = np.zeros_like(b), 0
     for segment in plan:
         step = RadauStep.factorized(E, A, segment.h)
-        for _ in range(segment.steps):
-            x, slope = step.advance(x, b)
-            outputs.append(model.F @ x[:n] + model.G @ x[n:] + model.H @ slope[n:] + model.D)
-    return np.stack(outputs, axis=2)
+        from_x, slope_from_x = step.advance(np.eye(2 * n), np.zeros((2 * n, 1)))  # a step is affine in x
+        from_b, slope_from_b = step.advance(np.zeros_like(b), b)
+        before, constant = of_slope @ slope_from_x, of_slope @ slope_from_b + model.D
+        for k in range(done, done + segment.steps):
+            outputs[:, :, k] = before @ x + constant
+            x = from_x @ x + from_b
+            outputs[:, :, k] += at_end @ x
+        done += segment.steps
+    return outputs
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmark_circuits import hinged_beam, rotor_in_rigid_bearing, two_track_mount
 from benchmark_mechanisms import gear_train, seven_body_mechanism
-from benchmark_problems import mobile_manipulator
+from benchmark_problems import intersection, mobile_manipulator, qep_with_two_infinite_eigenvalues
 from hypothesis import given, settings
 from structures import Structure, assembly, damped_structures, null_columns, structures
 
@@ -28,6 +28,7 @@ from halfdof_ctrl.errors import (
     MatrixError,
     SingularPencilError,
 )
+from halfdof_ctrl.polecheck import POLE_TOLERANCE, compare_poles
 
 FEWER = max(10, settings().max_examples // 5)  # each example integrates step responses of all inputs
 CHANGE = 1e-6  # a broken entry must be found
@@ -321,3 +322,34 @@ def test_wrong_systems_of_constrained_models_fail(letter: str) -> None:
     assert crosscheck(model, control.ss(*matrices.values())).passed
     matrices[letter][-1, 0] += 1e-6 * max(1.0, abs(matrices[letter][-1, 0]))
     assert not crosscheck(model, control.ss(*matrices.values())).passed
+
+
+@pytest.mark.parametrize("problem", [qep_with_two_infinite_eigenvalues, intersection])
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.LostDigitsWarning")
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.CloseDecisionWarning")
+def test_eigenvalues_that_rounding_moves_raise_no_alarm(problem: Callable[[], SecondOrderModel]) -> None:
+    """A defective double eigenvalue, and two that differ by 1e-8 beside some of 1e9: the pencil is singular between."""
+    model = problem()
+    improper = {int(i) for part in exact_reduction(model).polynomial_part for i in np.flatnonzero(part.any(axis=1))}
+    model = model.select(outputs=[name for i, name in enumerate(model.outputs) if i not in improper])
+    assert crosscheck(model, mech2ss(model)).passed
+
+
+@pytest.mark.parametrize("change", [1e-6, -1e-6])
+def test_simple_pole_beside_its_eigenvalue_is_an_error(change: float) -> None:
+    """Where P(s) is far from singular at the pole, nothing excuses it."""
+    model = mechss([[1]], [[3]], [[2]])
+    A = np.array([[-1.0 - change, 0.0], [0.0, -2.0]])
+    error, worst = compare_poles(model, A, np.array([-1.0, -2.0], dtype=complex), 1.0)
+    assert 0.4e-6 < error < 2e-6
+    assert worst.startswith("pole -1")
+
+
+def test_double_eigenvalue_split_by_rounding_is_none() -> None:
+    """``(s + 1)^2`` with poles -1 +- 1e-8: as near as rounding of M, C, K allows; with +- 1e-6 it is an error."""
+    model = mechss([[1]], [[2]], [[1]])
+    twice = np.array([-1.0, -1.0], dtype=complex)
+    for split, passes in ((1e-8, True), (1e-6, False)):
+        A = np.diag([-1.0 - split, -1.0 + split])
+        error, _ = compare_poles(model, A, twice, 1.0)
+        assert (error <= POLE_TOLERANCE) is passes
