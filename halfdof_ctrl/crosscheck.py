@@ -29,6 +29,7 @@ from halfdof_ctrl.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.reduction import complex_model_error
 from halfdof_ctrl.secondopinion import second_opinion
 from halfdof_ctrl.spectrum import ROUNDING, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.threads import limited_threads
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
@@ -156,6 +157,12 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
         msg = f"The system is discrete in time (dt = {sys.dt}), the model is not. Check it before it is sampled."
         raise ParameterError(msg, parameter="dt", value=sys.dt)
     require_regular(model)
+    with limited_threads(1):  # small matrices by the hundred: more threads wait for each other
+        return _compared(model, sys)
+
+
+def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
+    """Compare all that can be."""
     structure = pencil_structure(model)
     system = _Balanced.of(sys)
     finite = structure.finite_eigenvalues
