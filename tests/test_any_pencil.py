@@ -19,6 +19,7 @@ from anykinds import (
     floating,
     holonomic,
     in_units,
+    massless_nodes,
     mixed,
     redundant,
     signals,
@@ -297,6 +298,39 @@ def test_decimal_units_change_no_decision(
     assert found.states == reduction.states
     assert pairs(found) == pairs(reduction)
     assert errors(complete(found).balanced(), exact, tau=tau).max() <= UNITS
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "seed", "base", "columns", "rows", "time"),
+    [
+        (
+            massless_nodes,
+            *(11, 2191312, 8.0),
+            [-7, 2, -8, 8, 8, 9, -2, 2, -9, -7, -3],
+            [5, 5, -6, 0, -7, 9, -5, 6, -5, 7, -7],
+            -6,
+        ),
+        (
+            constrained,
+            *(10, 952, 10.0),
+            [3, -9, -5, 7, 3, -5, 4, 9, -6, -9],
+            [-8, 1, 3, -2, -9, -9, -6, 1, 4, -2],
+            5,
+        ),
+    ],
+)
+def test_leading_matrix_with_even_maxima_is_not_called_singular(
+    kind: Kind, size: int, seed: int, base: float, columns: list[int], rows: list[int], time: int
+) -> None:
+    """Regular by far in plain units, with rcond 1e-15 after its maxima were made even in these: the same road."""
+    generator = np.random.default_rng(seed)
+    model = signals(generator, kind(generator, size))
+    other = in_units(model, base ** np.array(columns), base ** np.array(rows), base**time)
+    plain, found = reduced(model), reduced(other)
+    assert plain.method != "deflation"
+    assert (found.method, found.order, found.states) == (plain.method, plain.order, plain.states)
+    assert min(plain.rcond, found.rcond) > 1e-3
+    assert exact_reduction(other, method=plain.method).order == plain.order
 
 
 def pairs(reduction: ExactReduction) -> set[tuple[int, int, int]]:
