@@ -30,6 +30,7 @@ from halfdof_ctrl.spectrum import balanced
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 AS_GIVEN = Caution(0.0, 0.0)  #: entries are what they are to the last digit
+ENOUGH = 1e-9  #: lost by floating point, above which exact row operations are tried as well
 LARGEST_EXACT = 60  #: equations up to which row operations are exact
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
 NOISE = 30.0  #: ... and below this times the error that was measured
@@ -166,30 +167,47 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     """
     system, units, pencil = _scaled(model)
     decisions: tuple[BlockDecision, ...] = ()
+    lossy: Deflated | None = None
     exactly = tol is None and system.size <= LARGEST_EXACT
     for rows, caution in _ways(system, exactly=exactly):
+        if lossy is not None and not isinstance(rows, ExactRows):
+            break
         relaxation = relaxed(rows, caution, tol)
         decisions = relaxation.decisions
         if relaxation.offsets is None:
-            if pencil.is_singular():
+            if lossy is None and pencil.is_singular():
                 raise _singular_error(model, pencil)
             continue
-        result = realized(relaxation.system, relaxation.offsets, caution)
-        certified = False
-        if isinstance(relaxation.system, ExactRows):
-            result = solved_without_rounding(result, relaxation.system)
-            certified = relaxation.system.exact and caution is not AS_GIVEN
-        certified = certified or pencil.has_spectrum(result.equations.A)
+        result, certified = _realized(relaxation, relaxation.offsets, caution, pencil)
         if certified or tol is not None:
             found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-            return replace(found, certified=certified)
+            if lossy is not None:
+                return min(lossy, found, key=lambda item: item.loss)
+            if not exactly or isinstance(rows, ExactRows) or found.loss <= ENOUGH:
+                return replace(found, certified=certified)
+            lossy = found
+    if lossy is not None:
+        return lossy
     raise _uncertain_error(model, decisions, tol)
+
+
+def _realized(
+    relaxation: Relaxed, offsets: Offsets, caution: Caution, pencil: ScaledPencil
+) -> tuple[Realization, bool]:
+    """Solve (18) and tell whether the spectrum is that of P(s), by exact arithmetic or by (19)."""
+    result, certain = realized(relaxation.system, offsets, caution), False
+    if isinstance(relaxation.system, ExactRows):
+        result = solved_without_rounding(result, relaxation.system)
+        certain = relaxation.system.exact and caution is not AS_GIVEN
+    return result, certain or pencil.has_spectrum(result.equations.A)
 
 
 def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caution]]:
     """Give the arithmetic and the caution to be tried in turn."""
-    if exactly:
-        rows = ExactRows.of(system)
+    rows = ExactRows.of(system) if exactly else None
+    if rows is not None and not rows.exact:  # numbers like 0.1: what cancels leaves rounding in any arithmetic
+        yield system, CAUTIONS[0]
+    if rows is not None:
         yield rows, CAUTIONS[0]
         yield rows, AS_GIVEN
     for caution in CAUTIONS:

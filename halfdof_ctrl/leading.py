@@ -12,7 +12,9 @@ from halfdof_ctrl.scaling import evening_logs
 
 SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
 FEWEST = 256  #: n in that bound at least
-PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number as it stands is not scaled ...
+PLAINLY_REGULAR = (
+    1e-5  #: W with this reciprocal condition number as it stands is not scaled, nor its state space compared ...
+)
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
 SMALL = 60  #: DOFs that are few
 MOST_STEPS = 16  #: of the iteration for the best scaling

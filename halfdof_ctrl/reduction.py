@@ -35,7 +35,7 @@ from halfdof_ctrl.errors import (
     SingularLeadingMatrixError,
     callers_level,
 )
-from halfdof_ctrl.leading import SINGULAR, LeadingMatrix
+from halfdof_ctrl.leading import PLAINLY_REGULAR, PLAINLY_REGULAR_IF_SMALL, SINGULAR, SMALL, LeadingMatrix
 from halfdof_ctrl.model import SecondOrderModel
 from halfdof_ctrl.names import listed, motion_names
 from halfdof_ctrl.outputs import output_signal, without_rounding
@@ -61,9 +61,6 @@ ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
-LOSS_SUSPECTED = 1e-5  #: W with a smaller rcond has its state space compared with direct solves ...
-LOSS_LOOKED_FOR = 1e-3  #: ... and in models that are cheap to solve W with a smaller rcond than this
-CHEAP = 60  #: DOFs of these models
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LARGEST_CERTIFIED = 500  #: DOFs up to which a sparse model with mixed coordinates is reduced densely
@@ -342,8 +339,8 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     UncertainRankError
         Entries nearly cancel, so that the number of states cannot be told to working precision.
     SingularLeadingMatrixError
-        `method` asks for a road on which W of equation (2) is singular to working precision (rcond below n eps
-        after equilibration).
+        `method` asks for a road on which W of equation (2) is singular to working precision (rcond below
+        max(n, 256) eps after scaling).
 
     Warns
     -----
@@ -473,7 +470,7 @@ def _warned(reduction: ExactReduction, method: Road | None) -> ExactReduction:
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     equations = reduction.equations
-    suspect = LOSS_LOOKED_FOR if len(reduction.model.dofs) <= CHEAP else LOSS_SUSPECTED
+    suspect = PLAINLY_REGULAR_IF_SMALL if len(reduction.model.dofs) <= SMALL else PLAINLY_REGULAR
     if reduction.rcond < suspect and reduction.tol is None and not isinstance(equations, SparseReduction):
         if method is None:
             reduction = _in_better_coordinates(reduction, equations)
