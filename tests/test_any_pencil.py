@@ -42,7 +42,7 @@ from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech
 from halfdof_ctrl.errors import ImproperError, LostDigitsWarning, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
-LOST = 1e-3  # the same where LostDigitsWarning was given
+LOST = 1e-6  # the same where LostDigitsWarning was given
 FAR = 1e-10  # in the roll-off, relative to the largest entry at any frequency
 COEFFICIENT = 1e-8  # of the polynomial part, relative to the largest of the same power of s
 CHARACTERISTIC = 1e-8  # det(sI - A), relative
