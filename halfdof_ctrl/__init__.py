@@ -1,12 +1,12 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
-from halfdof_ctrl.crosscheck import CrossCheck, crosscheck
-from halfdof_ctrl.descriptor import PencilStructure, pencil_structure, zeros
-from halfdof_ctrl.design import StateFeedback, lqr
-from halfdof_ctrl.errors import HalfdofError
-from halfdof_ctrl.files import inspect_files, load_model, load_system, save_model, save_response, save_system
-from halfdof_ctrl.model import SecondOrderModel, mechss
-from halfdof_ctrl.mounts import hydromount
+from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure, zeros
+from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.base.errors import HalfdofError
+from halfdof_ctrl.files.models import inspect_files, load_model, load_system, save_model, save_response, save_system
+from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import (
     bode_plot,
     dynamic_stiffness_plot,
@@ -15,14 +15,14 @@ from halfdof_ctrl.plots import (
     sweep_plot,
     transmissibility_plot,
 )
-from halfdof_ctrl.reduction import ExactReduction, exact_reduction
+from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
 from halfdof_ctrl.report import write_report
-from halfdof_ctrl.response import descriptor_response, frequency_response
-from halfdof_ctrl.statespace import mech2ss
-from halfdof_ctrl.stiffness import dynamic_stiffness, transmissibility
-from halfdof_ctrl.sweep import sweep
-from halfdof_ctrl.sweepresult import SweepFailure, SweepResult
-from halfdof_ctrl.truncation import TruncatedModel, truncate_modes
+from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.stiffness import dynamic_stiffness, transmissibility
+from halfdof_ctrl.sweeps.sweep import sweep
+from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
+from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
 
 __version__ = "0.1.0"
 

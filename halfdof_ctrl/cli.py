@@ -21,13 +21,13 @@ from typing import TypeAlias, overload
 import control
 import numpy as np
 
-from halfdof_ctrl.containers import MATRIX_ENDINGS, ending
-from halfdof_ctrl.crosscheck import crosscheck
-from halfdof_ctrl.descriptor import pencil_structure
-from halfdof_ctrl.design import StateFeedback, lqr
-from halfdof_ctrl.eigentable import eigenvalue_table
-from halfdof_ctrl.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
-from halfdof_ctrl.files import (
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
+from halfdof_ctrl.systems.crosscheck import crosscheck
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
+from halfdof_ctrl.files.models import (
     GAIN_ENDINGS,
     TABLE_ENDINGS,
     inspect_files,
@@ -37,24 +37,24 @@ from halfdof_ctrl.files import (
     save_response,
     save_system,
 )
-from halfdof_ctrl.horizon import relevant_poles, step_times
-from halfdof_ctrl.model import SecondOrderModel
-from halfdof_ctrl.mounts import hydromount
-from halfdof_ctrl.names import listed, motions
+from halfdof_ctrl.systems.step_times import relevant_poles, step_times
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.parts.mounts import hydromount
+from halfdof_ctrl.base.names import listed, motions
 from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
-from halfdof_ctrl.reduction import exact_reduction
+from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
-from halfdof_ctrl.response import (
+from halfdof_ctrl.systems.frequency import (
     DEFAULT_POINTS,
     FEW_POINTS,
     frequency_response,
     has_many_states,
     model_frequencies,
 )
-from halfdof_ctrl.statespace import mech2ss
-from halfdof_ctrl.stepplot import MOST_RECOVERED
-from halfdof_ctrl.stiffness import dynamic_stiffness_response, motion_frequencies
-from halfdof_ctrl.stiffnessplot import Scale
+from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.plots.step import MOST_RECOVERED
+from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.plots.stiffness import Scale
 
 PROGRAM = "halfdof-ctrl"
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2

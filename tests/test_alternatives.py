@@ -15,7 +15,7 @@ from numpy.testing import assert_allclose
 from test_examples import imported
 
 import halfdof_ctrl as hd
-from halfdof_ctrl.arrays import FloatArray
+from halfdof_ctrl.base.arrays import FloatArray
 
 PAGE = (Path(__file__).parents[1] / "docs" / "explanation" / "alternatives.md").read_text(encoding="utf-8")
 TEXT = " ".join(PAGE.split())

@@ -39,7 +39,7 @@ from verdict import (
 )
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss
-from halfdof_ctrl.errors import ImproperError, LostDigitsWarning, SingularPencilError
+from halfdof_ctrl.base.errors import ImproperError, LostDigitsWarning, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
 LOST = 1e-6  # the same where LostDigitsWarning was given

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl.arrays import DENSE_ROW_LIMIT, checked_matrix, is_complex, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.errors import MatrixError
+from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, checked_matrix, is_complex, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.errors import MatrixError
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
 

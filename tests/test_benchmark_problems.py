@@ -16,7 +16,7 @@ from test_any_pencil import pairs, reduced
 from verdict import Improved, characteristic_error, polynomial_at, polynomial_error, transfer_errors
 
 from halfdof_ctrl import mech2ss, mechss
-from halfdof_ctrl.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.base.errors import ImproperError, SingularPencilError
 
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
 DEEP = 1e-2  # of the largest entry at any frequency: below it, digits are counted against that

@@ -16,11 +16,11 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
 from halfdof_ctrl.cli import main
-from halfdof_ctrl.crosscheck import CrossCheck
-from halfdof_ctrl.design import lqr
-from halfdof_ctrl.errors import HalfdofError
-from halfdof_ctrl.files import load_system, save_model
-from halfdof_ctrl.sparseevaluation import SparseTransfer
+from halfdof_ctrl.systems.crosscheck import CrossCheck
+from halfdof_ctrl.design.lqr import lqr
+from halfdof_ctrl.base.errors import HalfdofError
+from halfdof_ctrl.files.models import load_system, save_model
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
 
 COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

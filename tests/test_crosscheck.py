@@ -21,14 +21,14 @@ from halfdof_ctrl import (
     mechss,
     pencil_structure,
 )
-from halfdof_ctrl.errors import (
+from halfdof_ctrl.base.errors import (
     ComplexModelError,
     HalfdofError,
     ImproperError,
     MatrixError,
     SingularPencilError,
 )
-from halfdof_ctrl.polecheck import POLE_TOLERANCE, compare_poles
+from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE, compare_poles
 
 FEWER = max(10, settings().max_examples // 5)  # each example integrates step responses of all inputs
 CHANGE = 1e-6  # a broken entry must be found

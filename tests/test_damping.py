@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.sparse import csc_array, diags_array
 
-from halfdof_ctrl.damping import lumped_damping
+from halfdof_ctrl.reduction.modal.damping import lumped_damping
 
 
 @given(alpha=st.floats(0.0, 10.0), beta=st.floats(0.0, 0.1), seed=st.integers(0, 2**32 - 1))

@@ -11,11 +11,12 @@ from mechanisms import JERK, SNAP, blade, derivatives, hanging_chain, in_units, 
 from numpy.testing import assert_allclose, assert_array_equal
 from test_deflation import POINTS, response
 
-from halfdof_ctrl import ExactReduction, SecondOrderModel, deflationroad, exact_reduction, hydromount, mechss
-from halfdof_ctrl.deflationroad import CAUTIONS, StateSelection, deflated, has_spectrum, loss
-from halfdof_ctrl.errors import SingularPencilError, UncertainRankError
-from halfdof_ctrl.rowsystems import Caution
-from halfdof_ctrl.signals import StateEquations
+from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, hydromount, mechss
+from halfdof_ctrl.reduction.deflation import method as deflationroad
+from halfdof_ctrl.reduction.deflation.method import CAUTIONS, StateSelection, deflated, has_spectrum, loss
+from halfdof_ctrl.base.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.reduction.deflation.row_system import Caution
+from halfdof_ctrl.reduction.method.signals import StateEquations
 
 FloatArray = npt.NDArray[np.float64]
 ROUNDOFF = 1e-12  # small well-conditioned models

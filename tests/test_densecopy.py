@@ -19,7 +19,7 @@ from halfdof_ctrl import (
     write_report,
     zeros,
 )
-from halfdof_ctrl.errors import ModelSizeError
+from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.report import default_effort
 
 WORKS: list[tuple[str, Callable[[SecondOrderModel], Any]]] = [

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from halfdof_ctrl import SecondOrderModel, StateFeedback, crosscheck, hydromount, lqr, mech2ss, mechss, pencil_structure
-from halfdof_ctrl.errors import SignalNameError, StabilizationError, WeightError
+from halfdof_ctrl.base.errors import SignalNameError, StabilizationError, WeightError
 
 RICCATI = 1e-9  # two Riccati solvers agree to the square root of their condition, here far better
 SOLVERS: tuple[Literal["scipy", "slycot"], ...] = ("scipy", "slycot")

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
-from halfdof_ctrl import errors
-from halfdof_ctrl.errors import (
+from halfdof_ctrl.base import errors
+from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
     FileFormatError,

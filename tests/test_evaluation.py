@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from structures import on_axis
 
-from halfdof_ctrl import evaluation
-from halfdof_ctrl.evaluation import quadratic_transfer
+from halfdof_ctrl.model import evaluation
+from halfdof_ctrl.model.evaluation import quadratic_transfer
 
 ROUNDOFF = 1e-12  # well-conditioned solves of up to 6 equations
 CORRECTED = 1e-9  # graded by 1e+-100 and solved in one go: the entries of every P(s) are still known to rounding

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.errors import FileFormatError
-from halfdof_ctrl.femfiles import ImportedModel, read_matrices
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
 
 
 def laid(folder: Path, **files: str | bytes) -> Path:

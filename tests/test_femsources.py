@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 from fe_files import C, K, M, abaqus, dmig, harwell_boeing, mapping, matrix_market, output4_binary, output4_text
 
-from halfdof_ctrl.errors import FileFormatError
-from halfdof_ctrl.femsources import Sources, find_sources
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.sources import Sources, find_sources
 
 
 def laid(folder: Path, **files: str | bytes) -> Path:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from halfdof_ctrl.fileroles import nastran_letter, role_of, siblings, with_labels
+from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_labels
 
 
 @pytest.mark.parametrize(

@@ -18,12 +18,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, frequency_response, hydromount, mech2ss, mechss
-from halfdof_ctrl.design import lqr
-from halfdof_ctrl.errors import FileFormatError, MatrixError, SignalNameError
-from halfdof_ctrl.files import load_model, load_system, replacing, save_gain, save_model, save_response, save_system
-from halfdof_ctrl.model import LETTERS
-from halfdof_ctrl.motion import KINDS, MotionKind
-from halfdof_ctrl.names import motion_names
+from halfdof_ctrl.design.lqr import lqr
+from halfdof_ctrl.base.errors import FileFormatError, MatrixError, SignalNameError
+from halfdof_ctrl.files.models import load_model, load_system, replacing, save_gain, save_model, save_response, save_system
+from halfdof_ctrl.model.second_order import LETTERS
+from halfdof_ctrl.model.motion import KINDS, MotionKind
+from halfdof_ctrl.base.names import motion_names
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".mat"])
 MOUNT = hydromount()
@@ -286,7 +286,7 @@ def test_names_in_bytes_are_read_as_text(tmp_path: Path) -> None:
 
 def test_a_matrix_too_large_to_be_held_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A small archive may claim to hold any size."""
-    monkeypatch.setattr("halfdof_ctrl.containers.MOST_BYTES", 2e4)
+    monkeypatch.setattr("halfdof_ctrl.files.containers.MOST_BYTES", 2e4)
     np.savez_compressed(tmp_path / "a.npz", K=np.zeros((100, 100)))
     with pytest.raises(FileFormatError, match=r"K is larger than the 2e\+04 bytes that are read"):
         load_model(tmp_path / "a.npz")

@@ -8,8 +8,8 @@ import scipy.io
 import scipy.sparse
 from fe_files import NAMES, C, K, M, harwell_boeing, mapping
 
-from halfdof_ctrl.errors import FileFormatError
-from halfdof_ctrl.harwellboeing import is_harwell_boeing, read_harwell_boeing, read_mapping
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.harwell_boeing import is_harwell_boeing, read_harwell_boeing, read_mapping
 
 LAYOUTS = [(1, 14, 1, 25), (10, 8, 3, 23), (4, 20, 5, 16)]  #: ANSYS's, and others
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from structures import on_axis
 
-from halfdof_ctrl import hessenberg
-from halfdof_ctrl.hessenberg import ShiftedSolver, state_space_response
+from halfdof_ctrl.systems import hessenberg
+from halfdof_ctrl.systems.hessenberg import ShiftedSolver, state_space_response
 
 FloatArray = npt.NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from fe_files import K, M, abaqus
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import inspect_files, save_model
-from halfdof_ctrl.importreport import mass_per_direction, matrix_report
-from halfdof_ctrl.model import mechss
-from halfdof_ctrl.rawmatrix import storage
+from halfdof_ctrl.files.import_report import mass_per_direction, matrix_report
+from halfdof_ctrl.model.second_order import mechss
+from halfdof_ctrl.files.formats.raw_matrix import storage
 
 
 def report_of(matrix: np.ndarray, largest: int = 1000) -> object:

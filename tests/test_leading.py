@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
-from halfdof_ctrl.leading import PLAINLY_REGULAR_IF_SMALL, LeadingMatrix
-from halfdof_ctrl.partition import DofPartition, orthonormal_bases, select_columns
-from halfdof_ctrl.singlesolve import leading_columns
+from halfdof_ctrl.reduction.algebra.leading_matrix import PLAINLY_REGULAR_IF_SMALL, LeadingMatrix
+from halfdof_ctrl.reduction.dense.partition import DofPartition, orthonormal_bases, select_columns
+from halfdof_ctrl.reduction.dense.single_solve import leading_columns
 
 ROUNDOFF = 1e-11  # random 6 x 6 matrices
 EPS = float(np.finfo(float).eps)

@@ -5,7 +5,7 @@ import numpy as np
 from hypothesis import given
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl.locus import followed
+from halfdof_ctrl.plots.branches import followed
 
 STEPS = 25
 

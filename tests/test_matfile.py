@@ -11,7 +11,7 @@ import scipy.io
 import scipy.sparse
 
 from halfdof_ctrl import HalfdofError
-from halfdof_ctrl.matfile import read_mat
+from halfdof_ctrl.files.formats.mat5 import read_mat
 
 FULL = np.array([[1.0, -2.5, 0.0], [4.0, 1e-300, 6.0]])
 

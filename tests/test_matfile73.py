@@ -14,8 +14,8 @@ import scipy.sparse
 from fe_files import CHAIN, K, M
 
 from halfdof_ctrl import load_model, mechss
-from halfdof_ctrl.errors import FileFormatError, MissingExtraError
-from halfdof_ctrl.matfile73 import is_mat73, read_mat73
+from halfdof_ctrl.base.errors import FileFormatError, MissingExtraError
+from halfdof_ctrl.files.formats.mat73 import is_mat73, read_mat73
 
 HEADER = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(512)
 

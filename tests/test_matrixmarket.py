@@ -12,8 +12,8 @@ from fe_files import K, matrix_market
 from hypothesis import given
 from hypothesis import strategies as st
 
-from halfdof_ctrl.errors import FileFormatError
-from halfdof_ctrl.matrixmarket import is_matrix_market, read_matrix_market
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.matrix_market import is_matrix_market, read_matrix_market
 
 REAL = "%%MatrixMarket matrix coordinate real general\n"
 

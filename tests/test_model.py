@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, structures
 
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import MatrixError, ModelSizeError, SignalNameError
-from halfdof_ctrl.model import LETTERS
+from halfdof_ctrl.base.errors import MatrixError, ModelSizeError, SignalNameError
+from halfdof_ctrl.model.second_order import LETTERS
 
 ROUNDOFF = 1e-12  # direct solves of small matrices with small integer entries
 EXACT = 1e-10  # the same with n <= 12 and conditions up to 1e6

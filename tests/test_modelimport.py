@@ -30,7 +30,7 @@ from fe_files import (
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, descriptor_response, inspect_files, load_model, mech2ss, mechss
-from halfdof_ctrl.errors import FileFormatError, ImportedModelWarning
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
 
 REAL_FILES = pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
 SAME = 1e-9  #: relative, of frequencies; the files have 10 to 16 digits and both sides read all of them

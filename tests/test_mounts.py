@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import exact_reduction, frequency_response, hydromount, mech2ss
-from halfdof_ctrl.errors import ParameterError
+from halfdof_ctrl.base.errors import ParameterError
 
 ROUNDOFF = 1e-10  # springs over six decades in series and parallel; python-control's own dcgain loses to 1e-8 here
 POSITIVE = st.floats(1e-1, 1e5)

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from halfdof_ctrl.errors import SignalNameError
-from halfdof_ctrl.names import (
+from halfdof_ctrl.base.errors import SignalNameError
+from halfdof_ctrl.base.names import (
     checked_dofs,
     checked_names,
     control_label,

@@ -6,7 +6,7 @@ import numpy.typing as npt
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from halfdof_ctrl.nullspaces import NullSpaces, causes, null_spaces
+from halfdof_ctrl.model.singular import NullSpaces, causes, null_spaces
 
 SEEDS = st.integers(0, 2**32 - 1)
 

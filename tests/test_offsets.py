@@ -12,7 +12,7 @@ from mechanisms import blade, derivatives, hanging_chain, rod
 from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, hydromount
-from halfdof_ctrl.offsets import ABSENT, irreducible_blocks, structural_offsets
+from halfdof_ctrl.reduction.deflation.offsets import ABSENT, irreducible_blocks, structural_offsets
 
 BoolArray = npt.NDArray[np.bool_]
 SEEDS = st.integers(0, 2**32 - 1)

@@ -9,8 +9,8 @@ import numpy.typing as npt
 import pytest
 from fe_files import EXPORTS, K, M, output4_binary, output4_text
 
-from halfdof_ctrl.errors import FileFormatError
-from halfdof_ctrl.output4 import is_binary_output4, is_text_output4, read_output4
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.output4 import is_binary_output4, is_text_output4, read_output4
 
 LAYOUTS = pytest.mark.parametrize("layout", ["dense", "sparse", "big"])
 HOLES = np.array([[0.0, 1.0, 0.0], [5.0, 0.0, 2.0], [0.0, -3.0, 0.0], [1e-9, 0.0, 0.0]])

@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, structures
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import NearlyMasslessWarning
-from halfdof_ctrl.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns, without_light_masses
+from halfdof_ctrl.base.errors import NearlyMasslessWarning
+from halfdof_ctrl.reduction.dense.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns, without_light_masses
 
 ORTHOGONAL = 1e-12  # products of orthonormal vectors with small integer matrices, n <= 12
 THERE_AND_BACK = 1e-10  # T of up to 12 mixed columns, scaled by powers of two, has a condition of up to 1e5

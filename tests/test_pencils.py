@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from halfdof_ctrl.arrays import powers_of_two
-from halfdof_ctrl.balancing import equilibrating_powers
-from halfdof_ctrl.pencils import finite_part, infinite_part
+from halfdof_ctrl.base.arrays import powers_of_two
+from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 
 EIGENVALUES = 1e-9  # after transformations of condition up to 1e3 on at most 10 unknowns
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from halfdof_ctrl import progress as module
-from halfdof_ctrl.progress import progress, progress_bar, silence
+from halfdof_ctrl.base import progress as module
+from halfdof_ctrl.base.progress import progress, progress_bar, silence
 
 
 @pytest.fixture(autouse=True)

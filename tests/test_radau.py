@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from halfdof_ctrl import hydromount, mechss
-from halfdof_ctrl.radau import (
+from halfdof_ctrl.descriptor.radau import (
     STAGES,
     RadauStep,
     Segment,

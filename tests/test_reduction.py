@@ -21,7 +21,7 @@ from structures import (
 )
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import (
+from halfdof_ctrl.base.errors import (
     ComplexModelError,
     InconsistentStateError,
     MatrixError,
@@ -30,7 +30,7 @@ from halfdof_ctrl.errors import (
     SingularLeadingMatrixError,
     SingularPencilError,
 )
-from halfdof_ctrl.partition import DofPartition
+from halfdof_ctrl.reduction.dense.partition import DofPartition
 
 EPS = float(np.finfo(float).eps)
 TRANSFER = 1e-10  # design, section 7: random structures, n <= 12, relative to the channel

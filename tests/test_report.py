@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import (
+from halfdof_ctrl.base.errors import (
     ComplexModelError,
     FileFormatError,
     ImproperError,
@@ -20,7 +20,7 @@ from halfdof_ctrl.errors import (
     SingularPencilError,
     WeightError,
 )
-from halfdof_ctrl.files import load_system
+from halfdof_ctrl.files.models import load_system
 from halfdof_ctrl.report import default_design, default_effort, write_report
 
 FILES = {

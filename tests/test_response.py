@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, damped_structures
 
 from halfdof_ctrl import descriptor_response, frequency_response, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import ParameterError, SingularPencilError
-from halfdof_ctrl.response import checked_frequencies, default_frequencies
+from halfdof_ctrl.base.errors import ParameterError, SingularPencilError
+from halfdof_ctrl.systems.frequency import checked_frequencies, default_frequencies
 
 AGREEMENT = 1e-10  # two routes, relative to the channel's largest value
 PEER = 1e-9  # python-control evaluates without balancing; its own loss on these small systems

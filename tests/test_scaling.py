@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.scaling import (
+from halfdof_ctrl.reduction.algebra.scaling import (
     EVEN,
     equilibrating_factors,
     evening_logs,
@@ -16,7 +16,7 @@ from halfdof_ctrl.scaling import (
     time_log,
     unit_free_factors,
 )
-from halfdof_ctrl.sparselu import sparse_levelling_factors
+from halfdof_ctrl.reduction.algebra.sparse_lu import sparse_levelling_factors
 
 ITERATED = 1e-6  # in logarithms to the base of two, after conjugate gradients
 SHAPES = st.tuples(st.integers(1, 8), st.integers(1, 8))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import hydromount, mechss
-from halfdof_ctrl.secondopinion import LARGEST, second_opinion
+from halfdof_ctrl.systems.second_opinion import LARGEST, second_opinion
 
 
 def test_slycot_counts_the_eigenvalues_and_zeros_of_the_mount() -> None:

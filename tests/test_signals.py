@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from halfdof_ctrl.signals import Signal, trimmed
+from halfdof_ctrl.reduction.method.signals import Signal, trimmed
 
 ROUNDOFF = 1e-10  # sums of a few dozen products of numbers near one, relative to values up to 1e2
 

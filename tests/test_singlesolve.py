@@ -13,10 +13,10 @@ from structures import Structure, structures
 from test_deflation import POINTS, response
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mechss
-from halfdof_ctrl.leading import LeadingMatrix
-from halfdof_ctrl.partition import DofPartition, orthonormal_bases, select_columns
-from halfdof_ctrl.signals import Rounding, StateEquations
-from halfdof_ctrl.singlesolve import leading_columns, rounding_of_solve, solved_at_once
+from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
+from halfdof_ctrl.reduction.dense.partition import DofPartition, orthonormal_bases, select_columns
+from halfdof_ctrl.reduction.method.signals import Rounding, StateEquations
+from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 
 FloatArray = npt.NDArray[np.float64]
 ROUNDOFF = 1e-13  # the mount

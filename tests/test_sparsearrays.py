@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl import sparsearrays
-from halfdof_ctrl.errors import MatrixError
-from halfdof_ctrl.sparsearrays import (
+from halfdof_ctrl.base import sparse_arrays as sparsearrays
+from halfdof_ctrl.base.errors import MatrixError
+from halfdof_ctrl.base.sparse_arrays import (
     as_sparse,
     checked_sparse_matrix,
     checked_sparse_squares,

@@ -12,10 +12,11 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csc_array
 from structures import Structure, on_axis, structures
 
-from halfdof_ctrl import mechss, sparseevaluation
-from halfdof_ctrl.errors import ModelSizeError
-from halfdof_ctrl.evaluation import quadratic_transfer
-from halfdof_ctrl.sparseevaluation import SparseTransfer
+from halfdof_ctrl import mechss
+from halfdof_ctrl.model import sparse_evaluation as sparseevaluation
+from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.model.evaluation import quadratic_transfer
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
 
 ROUNDOFF = 1e-10  # small integer matrices, away from poles but for chance
 POINTS: npt.NDArray[np.complex128] = np.array([0.37j, 1.13j, 0.6 + 0.2j])  # [rad/s]

@@ -16,15 +16,9 @@ from scipy.sparse import block_diag, coo_array, csc_array, csr_matrix, diags_arr
 from scipy.sparse.linalg import splu
 from structures import Structure, on_axis, structures
 
-from halfdof_ctrl import (
-    ExactReduction,
-    SecondOrderModel,
-    exact_reduction,
-    mech2ss,
-    mechss,
-    sparsedisplacement,
-)
-from halfdof_ctrl.errors import (
+from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss, mechss
+from halfdof_ctrl.reduction.sparse import displacement as sparsedisplacement
+from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
     InconsistentStateError,
@@ -32,8 +26,8 @@ from halfdof_ctrl.errors import (
     SingularLeadingMatrixError,
     SingularPencilError,
 )
-from halfdof_ctrl.sparselu import SparseLU
-from halfdof_ctrl.sparsepartition import SparsePartition
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
+from halfdof_ctrl.reduction.sparse.partition import SparsePartition
 
 EPS = float(np.finfo(float).eps)
 TRANSFER = 1e-10  # as for dense models: random structures, n <= 12, relative to the channel

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from halfdof_ctrl.sparsesolve import sparse_response
+from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
 COMPARED = 1e-12  # two elimination orders on matrices of moderate condition
 

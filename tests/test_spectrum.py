@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from halfdof_ctrl.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
 
 ROUNDOFF = 1e-12  # of a well-conditioned eigenvalue
 

@@ -14,7 +14,7 @@ from structures import Structure, assembly, damped_structures, null_columns, pas
 from test_reduction import POINTS, assert_same_transfer, response
 
 from halfdof_ctrl import exact_reduction, hydromount, mech2ss, mechss
-from halfdof_ctrl.errors import (
+from halfdof_ctrl.base.errors import (
     ComplexModelError,
     ImproperError,
     MatrixError,

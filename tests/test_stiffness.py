@@ -20,8 +20,8 @@ from halfdof_ctrl import (
     pencil_structure,
     transmissibility,
 )
-from halfdof_ctrl.errors import ParameterError, SignalNameError, SingularPencilError
-from halfdof_ctrl.stiffness import dynamic_stiffness_response, motion_frequencies, transmissibility_response
+from halfdof_ctrl.base.errors import ParameterError, SignalNameError, SingularPencilError
+from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies, transmissibility_response
 
 ROUNDOFF = 1e-12  # direct solves of small matrices with small integer entries
 EXACT = 1e-10  # the same with n <= 8 and conditions up to 1e6

@@ -22,8 +22,8 @@ from halfdof_ctrl import (
     transmissibility,
     transmissibility_plot,
 )
-from halfdof_ctrl.errors import ParameterError, SignalNameError
-from halfdof_ctrl.stiffness import motion_frequencies
+from halfdof_ctrl.base.errors import ParameterError, SignalNameError
+from halfdof_ctrl.systems.stiffness import motion_frequencies
 
 OMEGA = np.linspace(0.0, 100.0, 50)  #: [rad/s] around the hydromount's modes
 Plot = Callable[..., Any]

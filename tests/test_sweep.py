@@ -26,9 +26,9 @@ from halfdof_ctrl import (
     pencil_structure,
     sweep,
 )
-from halfdof_ctrl.errors import FailedCasesWarning, ParameterError, SignalNameError, SweepInterruptedError
-from halfdof_ctrl.onecase import by_size
-from halfdof_ctrl.threads import limited_threads
+from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError, SweepInterruptedError
+from halfdof_ctrl.sweeps.one_case import by_size
+from halfdof_ctrl.base.threads import limited_threads
 
 OMEGA = np.geomspace(1.0, 50.0, 7)
 ROUNDING = 1e-14  #: of the eigenvalues of a 2 x 2 matrix
@@ -299,7 +299,7 @@ def test_ctrl_c_keeps_what_is_done_here() -> None:
 
 def test_a_sweep_shows_how_far_it_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     """On request also here, where nobody watches."""
-    monkeypatch.setattr("halfdof_ctrl.progress.DELAY", 0.0)
+    monkeypatch.setattr("halfdof_ctrl.base.progress.DELAY", 0.0)
     sweep(sweepcases.square, {"x": range(5)}, progress=True)
     assert "cases: 100%" in capsys.readouterr().err
     sweep(sweepcases.square, {"x": range(5)})

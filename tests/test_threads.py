@@ -9,7 +9,7 @@ import threadpoolctl
 from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import sweep
-from halfdof_ctrl.threads import available_cores, limited_threads
+from halfdof_ctrl.base.threads import available_cores, limited_threads
 
 
 def thread_counts() -> list[int]:

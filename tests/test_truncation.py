@@ -12,19 +12,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.sparse import csc_array, diags_array
 
-from halfdof_ctrl import (
-    SecondOrderModel,
-    TruncatedModel,
-    craigbampton,
-    descriptor_response,
-    load_model,
-    mech2ss,
-    mechss,
-    save_model,
-    truncate_modes,
-    truncation,
-)
-from halfdof_ctrl.errors import (
+from halfdof_ctrl import SecondOrderModel, TruncatedModel, descriptor_response, load_model, mech2ss, mechss, save_model, truncate_modes
+from halfdof_ctrl.reduction.modal import craig_bampton as craigbampton
+from halfdof_ctrl.reduction.modal import truncation
+from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
     ModelSizeError,

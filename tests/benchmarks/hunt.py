@@ -31,8 +31,8 @@ from verdict import (
 )
 
 import halfdof_ctrl as hd
-from halfdof_ctrl.errors import ImproperError, SingularPencilError
-from halfdof_ctrl.model import LETTERS
+from halfdof_ctrl.base.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.model.second_order import LETTERS
 
 POINTS = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off

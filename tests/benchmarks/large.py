@@ -176,7 +176,7 @@ def growth(path: str) -> None:
     import scipy.linalg  # noqa: PLC0415
 
     import halfdof_ctrl as hd  # noqa: PLC0415
-    from halfdof_ctrl.threads import limited_threads  # noqa: PLC0415
+    from halfdof_ctrl.base.threads import limited_threads  # noqa: PLC0415
 
     def seconds(work: Callable[[], object], rounds: int = 3) -> float:
         best = float("inf")

@@ -22,7 +22,7 @@ from test_benchmark_problems import REGULAR, SINGULAR
 from verdict import ComplexArray, Improved, transfer_errors
 
 import halfdof_ctrl as hd
-from halfdof_ctrl.errors import HalfdofError
+from halfdof_ctrl.base.errors import HalfdofError
 
 GOOD = 1e-6  #: a worse transfer function is a wrong one
 

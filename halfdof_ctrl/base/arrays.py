@@ -1,0 +1,197 @@
+"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparsearrays`)."""
+
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import issparse
+
+from halfdof_ctrl.base.errors import MatrixError
+
+FloatArray: TypeAlias = npt.NDArray[np.float64]
+ComplexArray: TypeAlias = npt.NDArray[np.complex128]
+Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
+
+DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
+LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense for what works on dense matrices alone
+MATRIX_DIMENSIONS = 2
+REAL = np.dtype(np.float64)
+PLAIN = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
+SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
+
+
+def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> Matrix:
+    """Copy a value into a read-only matrix of finite numbers.
+
+    Parameters
+    ----------
+    value : array_like or scipy sparse array
+        Two-dimensional, or one-dimensional where `shape` shows a single row or column.
+    letter : str
+        The matrix's letter in ``M q'' + C q' + K q = B u`` and ``y = F q + G q' + H q'' + D u``.
+    shape : (int, int), optional
+        The shape that it must have; without it, it must be square.
+
+    Returns
+    -------
+    ndarray
+        float64, or complex128 where an imaginary part is nonzero; not writeable.
+
+    Raises
+    ------
+    MatrixError
+        Text or other things that are no numbers, ragged rows, wrong shape, empty, NaN or Inf, a
+        sparse matrix too large to be held dense.
+    """
+    array = _numbers(value, letter)
+    if shape is not None and array.ndim == 1:
+        array = _as_row_or_column(array, shape)
+    require_shape(array.shape, letter, shape)
+    if not np.logical_and.reduce(np.isfinite(array), axis=None):
+        row, column = (int(index) for index in np.argwhere(~np.isfinite(array))[0])
+        msg = f"{letter}[{row}, {column}] is {array[row, column]}: every entry must be a finite number."
+        raise MatrixError(msg, matrix=letter)
+    return read_only(array)
+
+
+def require_shape(found: tuple[int, ...], letter: str, shape: tuple[int, int] | None) -> None:
+    """Refuse a matrix that is not square, or not of the given shape, or empty.
+
+    Raises
+    ------
+    MatrixError
+        It is one of these.
+    """
+    if len(found) != MATRIX_DIMENSIONS or (found != shape if shape is not None else found[0] != found[1]):
+        expected = "square" if shape is None else f"{shape[0]} x {shape[1]}"
+        size = " x ".join(map(str, found)) or "a single number"
+        msg = f"{letter} must be {expected}, but it is {size}. Check its rows and columns against the DOFs and signals."
+        raise MatrixError(msg, matrix=letter)
+    if 0 in found:
+        msg = f"{letter} is empty: a model needs at least one DOF, one input and one output."
+        raise MatrixError(msg, matrix=letter)
+
+
+def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matrix]:
+    """Copy square matrices of one size into read-only ones, as `checked_matrix` does; None becomes zeros.
+
+    Raises
+    ------
+    MatrixError
+        As in `checked_matrix`, or all are None.
+    """
+    if all([type(value) in PLAIN for value in values]):  # noqa: C419  # a list is faster for three
+        together = _stacked(values)
+        if together is not None:
+            return together
+    size: tuple[int, int] | None = None
+    checked: list[Matrix | None] = []
+    for letter, value in zip(letters, values, strict=True):
+        checked.append(None if value is None else checked_matrix(value, letter, size))
+        if size is None and checked[-1] is not None:
+            size = (checked[-1].shape[0], checked[-1].shape[1])
+    if size is None:
+        msg = f"{', '.join(letters)} are all None: a model needs at least one of them."
+        raise MatrixError(msg, matrix=letters[-1])
+    return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
+
+
+def zero_matrix(rows: int, columns: int) -> FloatArray:
+    """Give a read-only matrix of zeros; small ones are shared."""
+    return _small_zeros(rows, columns) if rows * columns <= SHARED_SIZE else read_only(np.zeros((rows, columns)))
+
+
+def unit_matrix(size: int) -> FloatArray:
+    """Give a read-only identity matrix; small ones are shared."""
+    return _small_unit(size) if size * size <= SHARED_SIZE else read_only(np.eye(size))
+
+
+def powers_of_two(size: FloatArray) -> FloatArray:
+    """Powers of two that bring sizes to between 1/2 and 1, and 1 for a zero."""
+    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
+
+
+def is_complex(matrix: Matrix) -> bool:
+    """Tell whether a checked matrix has imaginary parts."""
+    return matrix.dtype != REAL
+
+
+def is_zero(matrix: Matrix) -> bool:
+    """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
+    if type(matrix) is not np.ndarray and issparse(matrix):
+        return bool(matrix.size == 0)  # of stored entries, none of which is zero
+    shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)
+    return shared or not matrix.any()
+
+
+def _numbers(value: object, letter: str) -> Matrix:
+    if hasattr(value, "toarray") and hasattr(value, "nnz"):
+        value = _dense(value, letter)
+    if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+        msg = f"{letter} has masked entries, which have no value. Fill them first."
+        raise MatrixError(msg, matrix=letter)
+    try:
+        array = np.array(value)
+        if array.dtype == REAL:
+            return array
+        if array.dtype.kind == "O" and any(isinstance(entry, str | bytes) for entry in array.flat):
+            msg = "it holds text"
+            raise TypeError(msg)  # noqa: TRY301  # told like the other conversions that fail
+        if array.dtype.kind in "biufO":
+            return array.astype(np.float64)
+        if array.dtype.kind == "c":
+            return array.astype(np.complex128) if array.imag.any() else array.real.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as cause:
+        msg = f"{letter} is not a matrix of numbers: {cause}."
+        raise MatrixError(msg, matrix=letter) from cause
+    msg = f"{letter} holds entries of type {array.dtype} where numbers are needed. Convert them first."
+    raise MatrixError(msg, matrix=letter)
+
+
+def _stacked(values: Sequence[object]) -> list[Matrix] | None:
+    """Copy real matrices in one piece, which is faster; None if anything about them wants a closer look."""
+    try:
+        stack = np.array(values)
+    except ValueError:  # of different shapes, to be told apart by checked_matrix
+        return None
+    if stack.dtype != REAL or stack.ndim != 1 + MATRIX_DIMENSIONS or stack.shape[1] != stack.shape[2] or not stack.size:
+        return None
+    if not np.logical_and.reduce(np.isfinite(stack), axis=None):
+        return None
+    stack.setflags(write=False)
+    return list(stack)
+
+
+def _dense(value: object, letter: str) -> object:
+    rows = value.shape[0]  # type: ignore[attr-defined]
+    if rows > DENSE_ROW_LIMIT:
+        msg = (
+            f"{letter} is sparse with {rows} rows; models are held dense here, up to {DENSE_ROW_LIMIT} rows. "
+            "Reduce the model first."
+        )
+        raise MatrixError(msg, matrix=letter)
+    return value.toarray()  # type: ignore[attr-defined]
+
+
+def _as_row_or_column(array: Matrix, shape: tuple[int, int]) -> Matrix:
+    if 1 in shape and array.size == shape[0] * shape[1]:
+        return array.reshape(shape)
+    return array
+
+
+def read_only(array: Matrix) -> Matrix:
+    """Lock an array of our own against writing and give it back."""
+    array.setflags(write=False)
+    return array
+
+
+@lru_cache(maxsize=256)
+def _small_zeros(rows: int, columns: int) -> FloatArray:
+    return read_only(np.zeros((rows, columns)))
+
+
+@lru_cache(maxsize=64)
+def _small_unit(size: int) -> FloatArray:
+    return read_only(np.eye(size))

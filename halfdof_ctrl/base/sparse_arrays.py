@@ -1,0 +1,305 @@
+"""Checked, read-only sparse matrices: compressed columns, sorted, without stored zeros.
+
+A column is null exactly where it stores nothing, which the partition reads. Every matrix of a sparse model is of this
+kind, its inputs and outputs included.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeAlias, cast
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array, csc_array, csr_array, eye_array, issparse
+
+from halfdof_ctrl.base.arrays import (
+    MATRIX_DIMENSIONS,
+    REAL,
+    FloatArray,
+    Matrix,
+    checked_matrix,
+    read_only,
+    require_shape,
+    unit_matrix,
+    zero_matrix,
+)
+from halfdof_ctrl.base.errors import MatrixError
+
+SparseMatrix: TypeAlias = csc_array
+IndexArray: TypeAlias = npt.NDArray[np.intp]
+
+
+class SparseLike(Protocol):
+    """A sparse array or matrix of scipy, in any format."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...  # noqa: D102
+    @property
+    def nnz(self) -> int: ...  # noqa: D102
+    def toarray(self) -> npt.NDArray[Any]: ...  # noqa: D102
+
+
+MatrixLike: TypeAlias = npt.ArrayLike | SparseLike
+
+
+MOST_STORED = 2**31 - 1  #: entries of a sparse matrix, which are counted in 32 bits by the factorization
+
+EXTENDED = 2**20  #: entries of a matrix that are copied in extended precision at a time
+
+
+def has_sparse(values: Sequence[object]) -> bool:
+    """Tell whether one of the values is a scipy sparse array or matrix."""
+    return any(issparse(value) for value in values)
+
+
+def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> Matrix:
+    """Copy a value into read-only compressed columns of finite numbers.
+
+    Parameters
+    ----------
+    value : scipy sparse array or matrix of any format, or array_like
+        Two-dimensional, or one-dimensional where `shape` shows a single row or column. Stored duplicates are added up.
+    letter : str
+        The matrix's letter.
+    shape : (int, int), optional
+        The shape that it must have; without it, it must be square.
+
+    Returns
+    -------
+    csc_array
+        float64, or complex128 where an imaginary part is nonzero; typed as the dense matrices are, since a model holds
+        either kind.
+
+    Raises
+    ------
+    MatrixError
+        As `arrays.checked_matrix`, or indices that lie outside the matrix.
+    """
+    if not issparse(value):
+        return _locked(csc_array(checked_matrix(value, letter, shape)))
+    given: Any = value
+    if given.ndim != MATRIX_DIMENSIONS and shape is not None and 1 in shape and given.shape == (max(shape),):
+        given = given.reshape(shape)
+    require_shape(given.shape, letter, shape)
+    if given.dtype.kind not in "biufc":
+        msg = f"{letter} holds entries of type {given.dtype} where numbers are needed. Convert them first."
+        raise MatrixError(msg, matrix=letter)
+    if given.nnz > MOST_STORED:
+        msg = f"{letter} stores {given.nnz} entries, and at most {MOST_STORED} can be factorized. Use a coarser mesh."
+        raise MatrixError(msg, matrix=letter)
+    try:
+        if hasattr(given, "check_format"):
+            given.check_format(full_check=True)
+        matrix = csc_array(given, copy=True)
+        matrix.sum_duplicates()
+    except (ValueError, IndexError) as cause:
+        msg = f"{letter} is no sound sparse matrix: {cause}. Assemble it anew."
+        raise MatrixError(msg, matrix=letter) from cause
+    if not np.isfinite(matrix.data).all():
+        place = int(np.flatnonzero(~np.isfinite(matrix.data))[0])
+        row, column = int(matrix.indices[place]), int(np.searchsorted(matrix.indptr, place, side="right")) - 1
+        msg = f"{letter}[{row}, {column}] is {matrix.data[place]}: every entry must be a finite number."
+        raise MatrixError(msg, matrix=letter)
+    if matrix.dtype.kind == "c" and not matrix.data.imag.any():
+        matrix = matrix.real
+    return _locked(matrix.astype(np.complex128 if matrix.dtype.kind == "c" else REAL, copy=False))
+
+
+def checked_sparse_squares(values: Sequence[object], letters: str) -> list[Matrix]:
+    """Copy square matrices of one size, of which some are sparse, into sparse ones; None becomes zeros.
+
+    Raises
+    ------
+    MatrixError
+        As in `checked_sparse_matrix`.
+    """
+    shape = next(np.shape(cast("Any", value)) for value in values if issparse(value))
+    require_shape(shape, next(letter for letter, value in zip(letters, values, strict=True) if issparse(value)), None)
+    return [
+        sparse_zeros(*shape) if value is None else checked_sparse_matrix(value, letter, (shape[0], shape[1]))
+        for letter, value in zip(letters, values, strict=True)
+    ]
+
+
+def sparse_zeros(rows: int, columns: int) -> Matrix:
+    """Give a read-only sparse matrix without entries."""
+    return _locked(csc_array((rows, columns)))
+
+
+def sparse_unit(size: int) -> Matrix:
+    """Give a read-only sparse identity matrix."""
+    return _locked(csc_array(eye_array(size, format="csc")))
+
+
+def zeros_like(pattern: Matrix, rows: int, columns: int) -> Matrix:
+    """Give zeros, dense or sparse as `pattern` is."""
+    return sparse_zeros(rows, columns) if is_sparse(pattern) else zero_matrix(rows, columns)
+
+
+def unit_like(pattern: Matrix, size: int) -> Matrix:
+    """Give an identity matrix, dense or sparse as `pattern` is."""
+    return sparse_unit(size) if is_sparse(pattern) else unit_matrix(size)
+
+
+def is_sparse(matrix: object) -> bool:
+    """Tell whether a matrix of a model is sparse."""
+    return isinstance(matrix, csc_array)
+
+
+def as_sparse(matrix: Matrix) -> SparseMatrix:
+    """Give a matrix of a model as compressed columns, which those of a sparse model are."""
+    return cast("SparseMatrix", matrix) if is_sparse(matrix) else csc_array(matrix)
+
+
+def picked_beside(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
+    """Give the picked columns of matrices that stand side by side, all dense or all sparse."""
+    if not is_sparse(parts[0]):
+        return read_only(np.hstack(parts)[:, picked])
+    return _locked(csc_array(as_sparse(joined_sparse([parts]))[:, list(picked)]))
+
+
+def picked_below(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
+    """Give the picked rows of matrices that stand one below the other, all dense or all sparse."""
+    if not is_sparse(parts[0]):
+        return read_only(np.vstack(parts)[picked])
+    stack = csr_array(as_sparse(joined_sparse([[part] for part in parts])))
+    return _locked(csc_array(stack[list(picked)]))
+
+
+def joined_sparse(blocks: Sequence[Sequence[Matrix]]) -> Matrix:
+    """Join blocks, dense or sparse, to one sparse matrix, complex only where there are imaginary parts."""
+    columns = [
+        np.concatenate([[0], np.cumsum([block.shape[1] for block in row])]) for row in blocks
+    ]  # empty blocks, which block_array does not take, add nothing but their size
+    rows = np.concatenate([[0], np.cumsum([row[0].shape[0] for row in blocks])])
+    entries = [
+        (part.data, part.row + rows[i], part.col + columns[i][j])
+        for i, row in enumerate(blocks)
+        for j, part in enumerate([coo_array(block) for block in row])
+    ]
+    data, row, column = (np.concatenate([entry[k] for entry in entries]) for k in range(3))
+    whole = csc_array(coo_array((data, (row, column)), shape=(int(rows[-1]), int(columns[0][-1]))))
+    if whole.dtype.kind == "c" and not whole.data.imag.any():
+        whole = whole.real
+    return _locked(whole)
+
+
+def unit_columns(matrices: Sequence[Matrix]) -> list[tuple[int, int] | None]:
+    """Find for each column which of the matrices holds its only entry and in which row, if that is 1."""
+    parts = [as_sparse(matrix) for matrix in matrices]
+    lengths = np.array([np.diff(part.indptr) for part in parts])
+    single = lengths.sum(axis=0) == 1
+    found: list[tuple[int, int] | None] = [None] * single.size
+    for which, part in enumerate(parts):
+        for column in np.flatnonzero(single & (lengths[which] == 1)).tolist():
+            place = part.indptr[column]
+            if part.data[place] == 1.0:
+                found[column] = which, int(part.indices[place])
+    return found
+
+
+def filled_rows(matrices: Sequence[Matrix]) -> list[bool]:
+    """Tell which rows have an entry in any of the matrices."""
+    filled = np.zeros(matrices[0].shape[0], dtype=bool)
+    for matrix in matrices:
+        filled[as_sparse(matrix).indices] = True
+    return filled.tolist()
+
+
+def transposed(matrix: Matrix) -> Matrix:
+    """Give the transpose of a sparse matrix in compressed columns."""
+    return cast("Matrix", csc_array(as_sparse(matrix).T))
+
+
+def times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
+    """Multiply a sparse and a dense matrix."""
+    return np.asarray(matrix @ dense)
+
+
+def transposed_times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
+    """Multiply the transpose of a sparse matrix and a dense matrix."""
+    return np.asarray(matrix.T @ dense)
+
+
+def exact_residual(matrix: SparseMatrix, right: Matrix, solution: Matrix, *, transposed: bool = False) -> Matrix:
+    """Give ``right - matrix solution``, summed in extended precision and rounded once.
+
+    Some columns of the matrix are worked at a time, so that it is not copied in that precision. Where a long double is
+    a double (Windows, ARM), this is the plain residual.
+
+    Examples
+    --------
+    >>> exact_residual(csc_array([[3.0]]), np.array([[1.0]]), np.array([[2.0]])).tolist()
+    [[-5.0]]
+    """
+    rest = np.array(right, dtype=np.longdouble)
+    wide = solution.astype(np.longdouble)
+    start = 0
+    while start < matrix.shape[1]:
+        room = matrix.indptr[start] + EXTENDED
+        stop = max(start + 1, int(np.searchsorted(matrix.indptr, room, side="right")) - 1)
+        part = slice(matrix.indptr[start], matrix.indptr[stop])
+        columns = csc_array(
+            (
+                matrix.data[part].astype(np.longdouble),
+                matrix.indices[part],
+                matrix.indptr[start : stop + 1] - matrix.indptr[start],
+            ),
+            shape=(matrix.shape[0], stop - start),
+        )
+        if transposed:
+            rest[start:stop] -= np.asarray(columns.T @ wide)
+        else:
+            rest -= np.asarray(columns @ wide[start:stop])
+        start = stop
+    return rest.astype(float)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Transposed:
+    """The transpose of a sparse matrix with few filled rows, ready to be multiplied."""
+
+    rows: IndexArray | None  #: filled rows of the matrix, None for all
+    part: csr_array  #: transpose of these
+
+    @classmethod
+    def of(cls, matrix: SparseMatrix) -> "Transposed":
+        """Prepare the transpose of a matrix."""
+        rows = np.unique(matrix.indices).astype(np.intp)
+        if rows.size > matrix.shape[0] // 2:
+            return cls(None, csr_array(matrix.T))
+        return cls(rows, csr_array(matrix.T[:, rows]))
+
+    def times(self, dense: Matrix) -> Matrix:
+        """Multiply with a dense matrix."""
+        return np.asarray(self.part @ (dense if self.rows is None else dense[self.rows]))
+
+
+def column_of_entries(matrix: SparseMatrix) -> IndexArray:
+    """Give the column of each stored entry."""
+    return np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
+
+
+def largest_by_row_and_column(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
+    """Give the size of the largest entry of each row and of each column, zero where there is none."""
+    size = np.abs(matrix.data)
+    by_row, by_column = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])
+    np.maximum.at(by_row, matrix.indices, size)
+    filled = np.flatnonzero(np.diff(matrix.indptr))
+    if filled.size:
+        by_column[filled] = np.maximum.reduceat(size, matrix.indptr[filled])
+    return by_row, by_column
+
+
+def locked(matrix: Matrix) -> Matrix:
+    """Lock a matrix of our own, dense or sparse, against writing."""
+    return _locked(csc_array(matrix, copy=True)) if issparse(matrix) else read_only(matrix)
+
+
+def _locked(matrix: SparseMatrix) -> Matrix:
+    """Bring into order, drop stored zeros, and lock against writing."""
+    matrix.sum_duplicates()
+    matrix.eliminate_zeros()
+    for part in (matrix.data, matrix.indices, matrix.indptr):
+        part.setflags(write=False)
+    return cast("Matrix", matrix)

@@ -1,0 +1,120 @@
+"""How fast transfer functions grow: which pairs of input and output are improper.
+
+With S_ij(s) the system pencil (9) of one input and one output,
+
+    H_ij = det S_ij / det P,   order of growth = deg det S_ij - deg det P                  (20)
+
+Most pairs need no determinant. P(s)^-1 grows at most as s^(index - 1), which settles displacements under forces up to
+index one. For the rest, H(s) is a strictly proper part and a polynomial D_0 + D_1 s + D_2 s^2 + ..., and Cauchy's
+formula on a circle around all finite eigenvalues gives its coefficients for all pairs at once. Only where rounding
+leaves one of them in doubt the degrees in (20) are counted.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.descriptor.finite_part import finite_part
+from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
+
+IntArray = npt.NDArray[np.int64]
+
+RADIUS = 8.0  #: of the circle, in units of the largest finite eigenvalue
+FEWEST_POINTS = 32  #: on the circle: the strictly proper part returns with 8^-24 at most
+NO_GROWTH = -1000  #: degree of a polynomial that is zero
+ROUNDED = 16.0  #: coefficients below so many of their rounding errors are zero
+CLEAR = 4096.0  #: coefficients above so many are not
+
+
+def improper_pairs(model: SecondOrderModel, eigenvalues: ComplexArray, index: int) -> tuple[tuple[str, str, int], ...]:
+    """List the (input, output, order of growth) of all transfer functions that grow with frequency.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        With a regular pencil.
+    eigenvalues : (k,) complex ndarray
+        Its finite eigenvalues.
+    index : int
+        Index of the pencil (8).
+
+    Returns
+    -------
+    tuple of (str, str, int)
+        Output by output, as matrices are read.
+    """
+    order = growth_orders(model, eigenvalues, index)
+    return tuple([(model.inputs[j], model.outputs[i], int(order[i, j])) for i, j in np.argwhere(order > 0).tolist()])
+
+
+def growth_orders(model: SecondOrderModel, eigenvalues: ComplexArray, index: int) -> IntArray:
+    """Find the order of growth of each pair (p, m), 0 for all that do not grow."""
+    bound = _bounds(model, index)
+    if bound.max() <= 0:
+        return np.zeros_like(bound)
+    order, unclear = _by_circle(model, eigenvalues, bound)
+    for i, j in np.argwhere(unclear).tolist():
+        order[i, j] = max(0, _finite_count(model, i, j) - eigenvalues.size)
+    return order
+
+
+def _bounds(model: SecondOrderModel, index: int) -> IntArray:
+    """Bound the growth by the degrees of B(s), F(s), D(s) and the growth of P(s)^-1."""
+    inputs = _degrees((model.B, model.Bv, model.Ba)).max(axis=0)
+    outputs = _degrees((model.F, model.G, model.H)).max(axis=1)
+    return np.asarray(np.maximum(outputs[:, None] + inputs + index - 1, _degrees((model.D, model.Dv, model.Da))))
+
+
+def _degrees(coefficients: tuple[Matrix, ...]) -> IntArray:
+    """Give the degree of each entry of a matrix polynomial."""
+    degrees = np.full(coefficients[0].shape, NO_GROWTH, dtype=np.int64)
+    for power, matrix in enumerate(coefficients):
+        degrees[matrix != 0.0] = power
+    return degrees
+
+
+def _by_circle(
+    model: SecondOrderModel, eigenvalues: ComplexArray, bound: IntArray
+) -> tuple[IntArray, npt.NDArray[np.bool_]]:
+    """Find the last coefficient of each polynomial part, and the pairs of which rounding does not let one be sure."""
+    most = int(bound.max())
+    count = max(FEWEST_POINTS, 2 ** int(np.ceil(np.log2(4 * (most + 1)))))
+    largest = float(np.abs(eigenvalues).max(initial=0.0))
+    radius = RADIUS * largest if largest > 0.0 else time_scale((model.K, model.C, model.M))
+    points = radius * np.exp(2j * np.pi * np.arange(count) / count)
+    coefficients = (
+        (model.K, model.C, model.M),
+        (model.B, model.Bv, model.Ba),
+        (model.F, model.G, model.H),
+        (model.D, model.Dv, model.Da),
+    )
+    with np.errstate(invalid="ignore"):
+        parts = np.abs(np.fft.fft(quadratic_transfer(*coefficients, points), axis=2) / count)[:, :, 1 : most + 1]
+    rounding = quadratic_rounding(*coefficients, points).max(axis=2, keepdims=True)
+    powers = np.arange(1, most + 1)
+    possible = powers <= bound[:, :, None]
+    present = possible & ~(parts <= ROUNDED * rounding)
+    clear = possible & (parts > CLEAR * rounding)
+    order, at_least = (np.where(which, powers, 0).max(axis=2) for which in (present, clear))
+    return order, order > at_least
+
+
+def _finite_count(model: SecondOrderModel, i: int, j: int) -> int:
+    """Count the finite eigenvalues of the system pencil of one pair, the degree of its determinant."""
+    pencil = first_order_pencil(system_pencil(model, [i], [j]))
+    part = finite_part(pencil.A, pencil.E)
+    return part.eigenvalues.size if part.is_regular else NO_GROWTH
+
+
+def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[Matrix]:
+    """Give the coefficients of the system pencil (9) of some outputs and inputs."""
+    return [
+        np.block([[P, -B[:, inputs]], [F[outputs], D[np.ix_(outputs, inputs)]]])
+        for P, B, F, D in (
+            (model.K, model.B, model.F, model.D),
+            (model.C, model.Bv, model.G, model.Dv),
+            (model.M, model.Ba, model.H, model.Da),
+        )
+    ]

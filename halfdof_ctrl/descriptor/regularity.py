@@ -1,0 +1,83 @@
+"""Whether the pencil of a sparse model is regular, for the oracle: one factorization and a few steps of iteration.
+
+At a generic point s the equilibrated P(s) of a regular pencil has a smallest singular value away from rounding. It is
+found by inverse iteration on P(s)^H P(s), which ends in a null vector where there is one. The reduction does not use
+this module.
+"""
+
+from typing import Any, cast
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import SingularPencilError
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
+from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
+from halfdof_ctrl.base.threads import limited_threads
+
+GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where P(s) is looked at, in units of the time scale
+SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero
+NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
+STEPS = 4  #: of inverse iteration
+NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
+
+
+@limited_threads(1)
+def require_regular_sparse(model: SecondOrderModel) -> None:
+    """Refuse a singular pencil of a sparse model, naming the DOFs that nothing holds.
+
+    Raises
+    ------
+    SingularPencilError
+        ``P(s)`` is singular to working precision at three generic points.
+    """
+    coefficients = [as_sparse(matrix) for matrix in (model.K, model.C, model.M)]
+    gamma, pencil = _time_scale(coefficients), SparsePencil.on_one_pattern(coefficients)
+    for point in GENERIC_POINTS:
+        ratio, null = _smallest_singular_value(pencil, gamma * point)
+        if ratio > SINGULAR:
+            return
+    dofs = tuple([model.dofs[k] for k in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
+    msg = (
+        f"The pencil is singular: det P(s) vanishes at every s (smallest singular value {ratio:.1e} of the largest "
+        f"after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node without spring, "
+        "damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant or give "
+        "it a stiffness."
+    )
+    raise SingularPencilError(msg, dofs=dofs)
+
+
+def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, FloatArray]:
+    """Estimate the smallest singular value of the scaled P(s), relative to the largest, and give its right vector."""
+    ordering, threshold = PIVOTINGS[1 if pencil.is_nearly_symmetric else -1]
+    try:
+        factors = PointFactors.of(pencil, s, ordering, threshold)
+        matrix, lu, known = factors.matrix, cast("Any", factors.lu), 1.0
+    except RuntimeError:  # exactly singular
+        matrix, _, _ = pencil.equilibrated_at(s)
+        nudge = diags_array(NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
+        lu, known = splu(csc_array(matrix + nudge)), 0.0
+    generator = np.random.default_rng(0)
+    vector = generator.standard_normal(matrix.shape[0]) + 1j * generator.standard_normal(matrix.shape[0])
+    length = 1.0
+    with np.errstate(all="ignore"):
+        for _ in range(STEPS):
+            vector = lu.solve(lu.solve(vector / np.linalg.norm(vector), trans="H"))
+            length = float(np.linalg.norm(vector))
+    largest = float(np.sqrt(abs(matrix).sum(axis=0).max() * abs(matrix).sum(axis=1).max()))
+    ratio = known / np.sqrt(length) / largest if np.isfinite(length) and largest > 0.0 else 0.0
+    return float(ratio), np.abs(np.nan_to_num(vector))
+
+
+def _time_scale(coefficients: list[SparseMatrix]) -> float:
+    """Give a frequency [rad/s], a power of two, at which the largest entries of K and M (or C) balance."""
+    K, C, M = (float(np.abs(matrix.data).max(initial=0.0)) for matrix in coefficients)
+    if K > 0.0 and M > 0.0:
+        return float(2.0 ** np.round(np.log2(K / M) / 2.0))
+    if K > 0.0 and C > 0.0:
+        return float(2.0 ** np.round(np.log2(K / C)))
+    return float(2.0 ** np.round(np.log2(C / M))) if C > 0.0 and M > 0.0 else 1.0

@@ -1,0 +1,94 @@
+"""The frequency response of a sparse model's descriptor form: a factorization a frequency, to be stopped at any time.
+
+Frequencies are worked from coarse to fine, so that what is done when the user stops it covers the whole range.
+"""
+
+import warnings
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.errors import InterruptedResponseWarning, callers_level
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.progress import progress
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
+from halfdof_ctrl.descriptor.regularity import require_regular_sparse
+from halfdof_ctrl.base.threads import limited_threads
+
+SUSPECT = 1e10  #: growth of a random solution at the first frequency above which the pencil is tested for regularity
+
+
+@limited_threads(1)
+def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """Evaluate equation (1) at frequencies, and keep what is done on an interrupt (Ctrl-C).
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        A sparse one.
+    frequencies : (k,) ndarray
+        [rad/s]
+
+    Returns
+    -------
+    (p, m, l) complex ndarray
+        Values, ``inf + nan j`` where ``P(s)`` is exactly singular.
+    (l,) ndarray
+        The frequencies of these: all of them, or after an interrupt those that were done, in their order.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+    ModelSizeError
+        A response with too many entries.
+    KeyboardInterrupt
+        No frequency was done yet.
+
+    Warns
+    -----
+    InterruptedResponseWarning
+        Not all frequencies were done.
+    """
+    p, m = model.D.shape
+    require_room(p, m, frequencies.size)
+    transfer = SparseTransfer(
+        (model.K, model.C, model.M),
+        (model.B, model.Bv, model.Ba),
+        (model.F, model.G, model.H),
+        (model.D, model.Dv, model.Da),
+    )
+    values = np.empty((p, m, frequencies.size), dtype=np.complex128)
+    done = np.zeros(frequencies.size, dtype=bool)
+    try:
+        for index in progress(coarse_to_fine(frequencies.size), "frequencies"):
+            values[:, :, index] = transfer.at(1j * frequencies[index])
+            if transfer.growth > SUSPECT and not done.any():
+                require_regular_sparse(model)
+            done[index] = True
+    except KeyboardInterrupt:
+        if not done.any():
+            raise
+        msg = (
+            f"Interrupted after {np.count_nonzero(done)} of {frequencies.size} frequencies: the response holds those "
+            "that are done, spread over the whole range."
+        )
+        warnings.warn(msg, InterruptedResponseWarning, stacklevel=callers_level())
+        return values[:, :, done], frequencies[done]
+    return values, frequencies
+
+
+def coarse_to_fine(count: int) -> list[int]:
+    """Order positions so that any beginning of the order is spread over all of them.
+
+    Examples
+    --------
+    >>> coarse_to_fine(6)
+    [0, 5, 4, 2, 1, 3]
+    """
+    order = dict.fromkeys([0, count - 1])
+    stride = 1 << count.bit_length()
+    while stride > 1:
+        stride //= 2
+        order.update(dict.fromkeys(range(0, count, stride)))
+    return list(order)

@@ -1,0 +1,167 @@
+"""Quadratic costs of mechanical models: weights on physical quantities as Q, R and N, equation (12)."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
+from halfdof_ctrl.base.errors import ImproperError, WeightError
+from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.reduction.dense.partition import DofPartition
+from halfdof_ctrl.reduction.choose import ExactReduction
+from halfdof_ctrl.systems.state_space import mech2ss
+
+Weights: TypeAlias = Mapping[str, float] | None
+
+INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
+UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cost:
+    """``x^T Q x + u^T R u + 2 x^T N u``, for N states and m inputs."""
+
+    Q: FloatArray  #: (N, N)
+    R: FloatArray  #: (m, m)
+    N: FloatArray  #: (N, m)
+
+
+def given_cost(
+    Q: npt.ArrayLike | None, R: npt.ArrayLike | None, N: npt.ArrayLike | None, reduction: ExactReduction
+) -> Cost:
+    """Check weighting matrices that were given."""
+    n, m = reduction.B.shape
+    if Q is None or R is None:
+        msg = "Q and R are both needed where matrices are given; physical weights need neither."
+        raise WeightError(msg, names=("Q",) if Q is None else ("R",))
+    cost = Cost(
+        checked_matrix(Q, "Q", (n, n)),
+        checked_matrix(R, "R", (m, m)),
+        np.zeros((n, m)) if N is None else checked_matrix(N, "N", (n, m)),
+    )
+    for letter, matrix in (("Q", cost.Q), ("R", cost.R), ("N", cost.N)):
+        if np.iscomplexobj(matrix) or (letter != "N" and not _is_symmetric(matrix)):
+            kind = "real" if letter == "N" else "real and symmetric"
+            msg = f"{letter} must be {kind}: take its symmetric part if that is what is meant."
+            raise WeightError(msg, names=(letter,))
+    _require_convex(cost, reduction.model.inputs)
+    return cost
+
+
+def physical_cost(reduction: ExactReduction, motions: list[Weights], effort: Weights, energy: float | None) -> Cost:
+    """Assemble Q, R and N from weights on motions, inputs and energy, equation (12)."""
+    model = reduction.model
+    n, m = reduction.B.shape
+    Q, R, N = np.zeros((n, n)), np.zeros((m, m)), np.zeros((n, m))
+    quantities: dict[str, float] = {}
+    for derivative, weights in enumerate(motions):
+        for dof, weight in _checked_weights(weights, model.dofs, "DOF"):
+            quantities[motion_names((dof,), derivative)[0]] = weight
+    parts = []
+    if quantities:
+        parts.append((*_weighted_rows(reduction, tuple(quantities)), np.diag(list(quantities.values()))))
+    if energy is not None:
+        parts += _energy_parts(reduction, _checked_weight("energy", energy))
+    for C, D, W in parts:
+        Q, N, R = Q + C.T @ W @ C, N + C.T @ W @ D, R + D.T @ W @ D
+    for name, weight in _checked_weights(effort, model.inputs, "input"):
+        R[model.inputs.index(name), model.inputs.index(name)] += weight
+    if not quantities and energy is None:
+        msg = "The cost sees no motion: weight a displacement, velocity, acceleration or the energy."
+        raise WeightError(msg, names=())
+    cost = Cost((Q + Q.T) / 2.0, (R + R.T) / 2.0, N)
+    _require_convex(cost, model.inputs)
+    return cost
+
+
+def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
+    """Give C and D of the named motions."""
+    try:
+        system = mech2ss(replace(reduction, model=reduction.model.select(outputs=names)))
+    except ImproperError as cause:
+        culprits = tuple(dict.fromkeys(output for _, output, _ in cause.pairs))
+        msg = (
+            f"{listed(culprits)} follows the derivative of an input, so that no weight on its square makes a quadratic "
+            "cost of states and inputs. Weight the displacement instead."
+        )
+        raise WeightError(msg, names=culprits) from cause
+    return np.asarray(system.C), np.asarray(system.D)
+
+
+def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
+    """Give the rows and weights of the kinetic and the elastic energy."""
+    model, part = reduction.model, reduction.partition
+    if model.prescribed:
+        msg = (
+            f"The motion of {listed(model.prescribed)} is prescribed, so that the mechanical energy is no function of "
+            "the states alone. Weight displacements and velocities instead."
+        )
+        raise WeightError(msg, names=("energy",))
+    for letter, matrix in (("M", model.M), ("K", model.K)):
+        if not _is_symmetric(matrix) or _smallest_eigenvalue(matrix) < -INDEFINITE:
+            msg = (
+                f"{letter} is not symmetric positive semidefinite, so that the model has no mechanical energy of the "
+                "usual form. Weight displacements and velocities instead."
+            )
+            raise WeightError(msg, names=("energy",))
+    if reduction.shift:
+        msg = "The energy of a model on which derivatives of inputs act (Bv, Ba) is no function of its states alone."
+        raise WeightError(msg, names=("energy",))
+    n, m = reduction.B.shape
+    if isinstance(part, DofPartition):  # only what has mass, whose velocity is a state
+        velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
+    else:
+        velocity = reduction.motion(1).X
+    displacement = reduction.displacement
+    return [
+        (velocity, np.zeros((len(model.dofs), m)), 0.5 * weight * model.M),
+        (displacement.X, displacement.direct(m), 0.5 * weight * model.K),
+    ]
+
+
+def _checked_weights(weights: Weights, known: tuple[str, ...], what: str) -> Iterator[tuple[str, float]]:
+    for name, value in (weights or {}).items():
+        if name not in known:
+            raise unknown_name_error(name, what, known)
+        yield name, _checked_weight(name, value)
+
+
+def _checked_weight(name: str, value: float) -> float:
+    """Read one weight: a finite number that is not negative."""
+    if isinstance(value, bool | str) or not np.isreal(value) or not math.isfinite(value) or value < 0.0:
+        msg = f"The weight of {name} is {value!r}, but it must be a finite number that is not negative."
+        raise WeightError(msg, names=(name,))
+    return float(value)
+
+
+def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:
+    """Refuse R that is not positive definite and a cost that is not positive semidefinite."""
+    diagonal = np.diagonal(cost.R)
+    free = tuple([name for name, weight in zip(inputs, diagonal.tolist(), strict=True) if weight <= 0.0])
+    if free:
+        msg = (
+            f"The inputs {listed(free)} cost nothing, so that the gain would be infinite. Give each a positive effort."
+        )
+        raise WeightError(msg, names=free)
+    if _smallest_eigenvalue(cost.R) <= INDEFINITE:
+        msg = f"R is not positive definite over the inputs {listed(inputs)}: some combination of them costs nothing."
+        raise WeightError(msg, names=inputs)
+    whole = np.block([[cost.Q, cost.N], [cost.N.T, cost.R]])
+    if _smallest_eigenvalue(whole) < -INDEFINITE:
+        msg = "The cost [[Q, N], [N', R]] is not positive semidefinite: it can be made as small as one likes."
+        raise WeightError(msg, names=("Q", "N", "R"))
+
+
+def _smallest_eigenvalue(matrix: FloatArray) -> float:
+    """Give the smallest eigenvalue after scaling the diagonal to one."""
+    scale = np.sqrt(np.abs(np.diagonal(matrix)))
+    scale = np.where(scale > 0.0, scale, max(scale.max(initial=0.0), 1.0))
+    return float(np.linalg.eigvalsh(matrix / scale / scale[:, None])[0])
+
+
+def _is_symmetric(matrix: FloatArray) -> bool:
+    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())

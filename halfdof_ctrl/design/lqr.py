@@ -1,0 +1,317 @@
+"""Linear quadratic regulators with weights on physical quantities.
+
+The cost of the feedback u = -K x on a reduced model is
+
+    J = integral of  sum_d w_d q_d^2 + sum_d v_d q'_d^2 + sum_d a_d q''_d^2 + e E + sum_j r_j u_j^2   dt,
+    E = 1/2 q'^T M q' + 1/2 q^T K q                                                        (12)
+
+Every quantity is C x + D u with the direct term of (4), so each weight w adds w C^T C to Q, w C^T D to N and
+w D^T D to R; half and static DOFs are weighted like any other. `control.lqr` solves the Riccati equation; what it
+returns is accepted only if the closed loop is stable.
+
+A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is the second-order model
+
+    M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import control
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
+from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.base.errors import StabilizationError, WeightError
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.names import force_names, listed, motion_names
+from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.reduction.sparse.partition import SparsePartition
+from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
+
+UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
+DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
+MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class StateFeedback:
+    """A stabilizing feedback ``u = -K x`` on a reduced model, for N states and m inputs."""
+
+    model: SecondOrderModel  #: the open loop
+    reduction: ExactReduction  #: the open loop, reduced
+    cost: Cost  #: what was minimized
+    K: FloatArray  #: (m, N) gain
+    S: FloatArray  #: (N, N) solution of the Riccati equation: the cost from x is x^T S x
+    closed_loop: control.StateSpace  #: from the model's inputs to its outputs, with the feedback
+    poles: ComplexArray  #: (N,) of the closed loop [rad/s]
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the rows of K."""
+        return self.model.inputs
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the columns of K."""
+        return self.reduction.states
+
+    def as_mechss(self) -> SecondOrderModel:
+        """Give the closed loop as a second-order model, equation (13).
+
+        Its finite eigenvalues are the closed-loop poles, which checks the design without the reduction.
+
+        Raises
+        ------
+        WeightError
+            Derivatives of the inputs act on the model (by `Bv`, `Ba` or a constraint), so that the state is not a
+            function of q and its derivatives alone; or a state is a third or higher derivative of a DOF.
+        """
+        if self.reduction.shift:
+            msg = (
+                f"The states of this model contain its inputs {listed(self.inputs)}, whose derivatives act on it (by "
+                "Bv, Ba or a constraint): the closed loop is no second-order model of the same form. Use `closed_loop`."
+            )
+            raise WeightError(msg, names=self.inputs)
+        model, K = self.model, self.K
+        partition = self.reduction.partition
+        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
+        if len(gains) > DERIVATIVES:
+            msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
+            raise WeightError(msg, names=self.states)
+        on_q, on_v, on_a = (*gains, np.zeros_like(gains[0]))[:DERIVATIVES]
+        return replace(
+            model,
+            M=read_only(model.M + model.B @ on_a),
+            C=read_only(model.C + model.B @ on_v),
+            K=read_only(model.K + model.B @ on_q),
+            F=read_only(model.F - model.D @ on_q),
+            G=read_only(model.G - model.D @ on_v),
+            H=read_only(model.H - model.D @ on_a),
+            name=self.closed_loop.name,
+        )
+
+    def __repr__(self) -> str:
+        """Print the gain with its labels and the closed-loop poles."""
+        width = max(11, *(len(state) + 1 for state in self.states))
+        first = max(len(name) for name in self.inputs)
+        lines = [f"StateFeedback u = -K x, {len(self.inputs)} x {len(self.states)}"]
+        lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
+        for name, row in zip(self.inputs, self.K, strict=True):
+            lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
+        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        return "\n".join([*lines, f"  closed-loop poles: {poles}"])
+
+
+def lqr(
+    model: SecondOrderModel,
+    Q: npt.ArrayLike | None = None,
+    R: npt.ArrayLike | None = None,
+    N: npt.ArrayLike | None = None,
+    *,
+    displacement: Weights = None,
+    velocity: Weights = None,
+    acceleration: Weights = None,
+    effort: Weights = None,
+    energy: float | None = None,
+    method: Literal["scipy", "slycot"] = "scipy",
+) -> StateFeedback:
+    """Design a linear quadratic regulator for a mechanical model.
+
+    Give either matrices or physical weights. A useful first choice of a weight is one over the square of the
+    largest value that is acceptable (Bryson's rule).
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Its inputs are the actuators; choose them with `select`.
+    Q, R, N : (N, N), (m, m), (N, m) array_like, optional
+        Weights of ``x^T Q x + u^T R u + 2 x^T N u``, as in `control.lqr`, on the states of `exact_reduction`.
+    displacement, velocity, acceleration : mapping from DOF to weight, optional
+        Weights of the squares of any DOF's motion [1/m^2, s^2/m^2, s^4/m^2], none negative.
+    effort : mapping from input to weight, optional
+        Weights of the squares of the inputs [1/N^2], positive.
+    energy : float, optional
+        Weight of the total mechanical energy, kinetic and elastic [1/J].
+    method : {"scipy", "slycot"}, optional
+        Solver, as in `control.lqr`. scipy's balances what the units of mechanics spread over many powers of
+        ten, and gives the same digits whether or not slycot is there.
+
+    Returns
+    -------
+    StateFeedback
+        The gain with its labels, the closed loop, and the way back to a second-order model.
+
+    Raises
+    ------
+    WeightError
+        Weights that are negative or not finite, an input without a weight, a cost that is not positive
+        semidefinite, a model without states, the energy of a model without one (unsymmetric or indefinite M or K), or a
+        quantity that follows the derivative of an input.
+    SignalNameError
+        A weight on a DOF or input that is not there.
+    StabilizationError
+        No stabilizing gain: a mode on or right of the imaginary axis that the inputs do not reach, or one on
+        the axis that the cost does not see.
+
+    Examples
+    --------
+    For a mass of 1 kg, weights 1 on displacement and force give the gains 1 and sqrt(2):
+
+    >>> model = mechss([[1]], [[0]], [[0]], dofs="y")
+    >>> lqr(model, displacement={"y": 1}, effort={"F_y": 1}).K.round(6).tolist()
+    [[1.0, 1.414214]]
+    """
+    physical = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
+    model = dense_copy(model, "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R).")
+    reduction = exact_reduction(model)
+    if reduction.order == 0:
+        msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."
+        raise WeightError(msg, names=())
+    if Q is not None or R is not None or N is not None:
+        if effort is not None or energy is not None or any(weights is not None for weights in physical.values()):
+            msg = "Give either the matrices Q, R, N or physical weights, not both."
+            raise WeightError(msg, names=("Q", "R", "N"))
+        cost = given_cost(Q, R, N, reduction)
+    else:
+        cost = physical_cost(reduction, list(physical.values()), effort, energy)
+    plant = mech2ss(reduction)
+    gain, riccati = _solved(reduction, cost, method)
+    A, B = reduction.A, reduction.B
+    closed = labelled_system(
+        A - B @ gain,
+        B,
+        plant.C - plant.D @ gain,
+        plant.D,
+        states=reduction.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=f"{model.name}_lqr" if model.name else None,
+    )
+    return StateFeedback(
+        model=model,
+        reduction=reduction,
+        cost=cost,
+        K=read_only(gain),
+        S=read_only(riccati),
+        closed_loop=closed,
+        poles=_eigenvalues(A - B @ gain),
+    )
+
+
+def _solved(reduction: ExactReduction, cost: Cost, method: Literal["scipy", "slycot"]) -> tuple[FloatArray, FloatArray]:
+    """Solve by `control.lqr` and accept the gain only if it stabilizes."""
+    A, B = reduction.A, reduction.B
+    _require_stabilizing_solution(reduction, cost)
+    try:
+        gain, riccati, _ = control.lqr(A, B, cost.Q, cost.R, cost.N, method=method)
+    except (ArithmeticError, ValueError) as cause:  # what the solvers raise where they find no gain
+        raise _unsolved_error(_eigenvalues(A)) from cause
+    gain, riccati = np.asarray(gain) + 0.0, np.asarray(riccati)
+    poles = _eigenvalues(A - B @ gain)
+    margin = MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
+    if not np.isfinite(gain).all() or (poles.real >= -margin).any():
+        raise _unsolved_error(poles)
+    return gain, riccati
+
+
+def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None:
+    """Refuse a mode that no feedback stabilizes or that the optimal one would leave on the axis.
+
+    A stabilizing solution of the Riccati equation exists if and only if every mode that is not stable is
+    reached by the inputs and no mode on the imaginary axis is hidden from the cost (K. Zhou, J. C. Doyle and
+    K. Glover, Robust and Optimal Control, theorem 13.7).
+    """
+    A, B = reduction.A, reduction.B
+    cross = np.linalg.solve(cost.R, cost.N.T)
+    for eigenvalue in _axis_eigenvalues(A, right_too=True):
+        mode = _null_vector(A.T, B.T, eigenvalue)
+        if mode is not None:
+            force = _best_force(reduction, mode)
+            msg = (
+                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and no input reaches it, so that no feedback "
+                f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
+            )
+            raise StabilizationError(msg, eigenvalue=eigenvalue, quantity=f"F_{force}")
+    for eigenvalue in _axis_eigenvalues(A - B @ cross, right_too=False):
+        mode = _null_vector(A - B @ cross, cost.Q - cost.N @ cross, eigenvalue)
+        if mode is not None:
+            kind, dof = _largest_motion(reduction, mode)
+            msg = (
+                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost does not see it, so that the "
+                f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
+            )
+            raise StabilizationError(
+                msg, eigenvalue=eigenvalue, quantity=motion_names((dof,), int(kind == "velocity"))[0]
+            )
+
+
+def _axis_eigenvalues(A: FloatArray, *, right_too: bool) -> list[complex]:
+    """List the eigenvalues on the imaginary axis, to what rounding in A tells, or also right of it.
+
+    Those within rounding of the axis or of zero are moved there, since a double eigenvalue is known to half
+    the digits only.
+    """
+    values, known_to = eigenvalues_and_rounding(A)
+    found = []
+    for value, error in zip(values.tolist(), known_to.tolist(), strict=True):
+        if abs(value) <= error:
+            found.append(0j)
+        elif abs(value.real) <= error:
+            found.append(complex(0.0, value.imag))
+        elif right_too and value.real > 0.0:
+            found.append(value)
+    return found
+
+
+def _unsolved_error(poles: ComplexArray) -> StabilizationError:
+    """Make the refusal where the solver failed although a gain exists."""
+    worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    msg = (
+        f"The solver found no stabilizing gain, although one exists: a pole stays at {_in_words(worst)} rad/s. The "
+        "weights may differ by too many powers of ten; bring Q and R closer together."
+    )
+    return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
+
+
+def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
+    """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
+    matrix, scale = balanced_states(A)
+    shown = C * scale
+    size = np.abs(shown).max(axis=1, keepdims=True)
+    shown = shown / np.where(size > 0.0, size, 1.0) * np.linalg.norm(matrix, 2)
+    stack = np.vstack([matrix - eigenvalue * np.eye(A.shape[0]), shown])
+    _, values, right = np.linalg.svd(stack)
+    if values[-1] > UNREACHED * values[0]:
+        return None
+    return np.asarray(scale * right[-1].conj())
+
+
+def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
+    """Name the DOF whose force drives a left eigenvector most."""
+    every_force = exact_reduction(reduction.model.select(inputs=force_names(reduction.model.dofs)))
+    driven = np.abs(mode @ every_force.B)
+    return reduction.model.dofs[int(np.argmax(driven))]
+
+
+def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str, str]:
+    """Say in the displacement or velocity of which DOF a mode shows most, displacements first."""
+    shares = [np.abs(reduction.motion(derivative).X @ mode) for derivative in range(2)]
+    derivative = 0 if shares[0].max() > UNREACHED * shares[1].max() else 1
+    return ("displacement", "velocity")[derivative], reduction.model.dofs[int(np.argmax(shares[derivative]))]
+
+
+def _eigenvalues(A: FloatArray) -> ComplexArray:
+    return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
+
+
+def _in_words(value: complex) -> str:
+    """Write a pole with four digits, a pair as one."""
+    if abs(value.imag) <= UNREACHED * abs(value):
+        return f"{value.real:.4g}"
+    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"

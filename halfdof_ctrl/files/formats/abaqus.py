@@ -1,0 +1,135 @@
+"""Matrices that Abaqus writes as text: ``*MATRIX GENERATE`` with ``*MATRIX OUTPUT``.
+
+In the file ``job_STIF1.mtx`` (MASS: mass, DMPV: viscous damping, DMPS: structural damping; 1 is the step) stand lines
+
+    node, DOF, node, DOF, value          (FORMAT=MATRIX INPUT, the default)
+    row, column, value                   (FORMAT=COORDINATE, without labels)
+
+with comments ``**`` and keywords ``*MATRIX``. It is no Matrix Market file in spite of its ending. Of a symmetric
+matrix one entry of each off-diagonal pair is written; an unsymmetric one has both. Nodes with a negative label are
+internal, as the multipliers of constraints. A DOF under a boundary condition has 1e36 on the diagonal of its
+stiffness.
+
+Source: Abaqus Analysis User's Guide, "Generating structural matrices"; Keywords Reference, ``*MATRIX INPUT``.
+"""
+
+import re
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.labels import dof_names
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled, completed
+from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
+
+Keys: TypeAlias = npt.NDArray[np.int64]
+
+LABELLED, UNLABELLED = 5, 3  #: numbers in a line
+TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
+LARGEST_LABEL = 2**31 - 1
+INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
+COMPONENT_BITS = 16
+
+
+def data_columns(content: bytes) -> int:
+    """Count the numbers in the first line of data: 5 or 3, or 0 if it is no line of Abaqus."""
+    for line in content[:65536].split(b"\n"):
+        if line.strip() and not line.startswith(b"*"):
+            fields = line.replace(b",", b" ").split()
+            numbers = all(re.fullmatch(rb"[-+]?[0-9.]+([DEde]?[-+]?[0-9]+)?", field) for field in fields)
+            return len(fields) if numbers and len(fields) in {LABELLED, UNLABELLED} else 0
+    return 0
+
+
+def read_abaqus(content: bytes) -> RawMatrix:
+    r"""Read a matrix.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+
+    Raises
+    ------
+    FileFormatError
+        No data, lines with more or fewer numbers, labels that are no whole numbers.
+
+    Examples
+    --------
+    >>> raw = read_abaqus(b"** made by hand\n1,1, 1,1, 4.\n2,1, 1,1, -1.\n2,1, 2,1, 3.\n")
+    >>> raw.dofs, raw.matrix.toarray().tolist()
+    (('n1_u1', 'n2_u1'), [[4.0, -1.0], [-1.0, 3.0]])
+    """
+    columns = data_columns(content)
+    if not columns:
+        msg = (
+            "no line of numbers in it that Abaqus writes (node, DOF, node, DOF, value). Write it by *MATRIX OUTPUT "
+            "with FORMAT=MATRIX INPUT."
+        )
+        raise FileFormatError(msg, path="")
+    table = number_rows(content, columns, comment="*")
+    declared = _declared(content)
+    raw = _labelled(table, declared) if columns == LABELLED else _unlabelled(table, declared)
+    if declared == "unsaid" and raw.is_half_stored:
+        return completed(raw)
+    return raw
+
+
+def _declared(content: bytes) -> Declared:
+    found = TYPE.search(content[:65536])
+    if found is None:
+        return "unsaid"
+    return "symmetric" if found[1].lower() == b"symmetric" else "general"
+
+
+def _labelled(table: FloatArray, declared: Declared) -> RawMatrix:
+    labels = whole_numbers(table[:, :4], "node and DOF labels")
+    if labels.size and (np.abs(labels).max() > LARGEST_LABEL or (labels[:, 1::2] < 0).any()):
+        msg = "a node or DOF label is out of range. The file is damaged."
+        raise FileFormatError(msg, path="")
+    rows, columns = _keys(labels[:, 0], labels[:, 1]), _keys(labels[:, 2], labels[:, 3])
+    known = np.union1d(rows, columns)
+    return assembled(
+        np.searchsorted(known, rows),
+        np.searchsorted(known, columns),
+        table[:, 4],
+        (known.size, known.size),
+        declared=declared,
+        format="Abaqus matrix input",
+        dofs=_names(known),
+    )
+
+
+def _unlabelled(table: FloatArray, declared: Declared) -> RawMatrix:
+    places = whole_numbers(table[:, :2], "row and column numbers") - 1
+    size = int(places.max()) + 1
+    if size > max(MOST_ROWS, table.size):
+        msg = f"a row or column number is {size}. The file is damaged."
+        raise FileFormatError(msg, path="")
+    return assembled(
+        places[:, 0],
+        places[:, 1],
+        table[:, 2],
+        (size, size),
+        declared=declared,
+        format="Abaqus coordinate",
+        notes=("rows have no labels in this format",),
+    )
+
+
+def _keys(nodes: Keys, components: Keys) -> Keys:
+    """Make keys that sort by node and DOF, internal nodes last."""
+    order = np.where(nodes >= 0, nodes, INTERNAL - nodes)
+    if (components >= 2**COMPONENT_BITS).any():
+        msg = f"a DOF number is {components.max()}. The file is damaged."
+        raise FileFormatError(msg, path="")
+    return np.asarray((order << COMPONENT_BITS) + components)
+
+
+def _names(keys: Keys) -> tuple[str, ...]:
+    order, components = keys >> COMPONENT_BITS, keys & (2**COMPONENT_BITS - 1)
+    nodes = np.where(order > LARGEST_LABEL, INTERNAL - order, order)
+    return dof_names(nodes.tolist(), components.tolist())

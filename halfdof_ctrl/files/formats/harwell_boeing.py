@@ -1,0 +1,236 @@
+"""Harwell-Boeing files, as the command HBMAT of ANSYS writes them, and their mapping file.
+
+    title (72 characters), key (8)
+    lines in all, of pointers, of row numbers, of values, of right-hand sides         (5 x 14 characters)
+    type (3 letters), then rows, columns, entries, elements                           (14 characters each)
+    formats of pointers, row numbers (16 each), values, right-hand sides (20 each)
+    type of the right-hand sides, ...                                                 (only if there are any)
+
+and then the columns compressed: where each starts, the row numbers, the values, in Fortran's fixed-width fields. The
+type ``RSA`` is real, symmetric (the lower triangle is stored) and assembled, ``RUA`` unsymmetric. `scipy.io.hb_read`
+(1.17) rejects RSA, which is what finite-element programs write. Layout: Duff, Grimes and Lewis, Users' Guide for the
+Harwell-Boeing Sparse Matrix Collection, 1992.
+
+The mapping file has a line of titles and then ``equation, node, DOF label`` lines.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.labels import WORD, ansys_name
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
+from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, Lines, fixed_width, printable, whole_numbers
+
+TYPE = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
+FORMATS = re.compile(rb"\(((?:[^()]|\([^()]*\))*)\)")
+DESCRIPTOR = re.compile(r"^(?:([+-]?\d+)P,?)?(\d*)\(?([IDEFG])(\d+)(?:\.\d+)?(?:E\d+)?\)?$")
+SYMMETRIES: dict[str, Declared] = {"S": "symmetric", "Z": "skew-symmetric", "U": "general", "R": "general"}
+TITLES = {"stiff": "K", "mass": "M", "damp": "C"}  #: first word of ANSYS's titles
+HEADER_LINES = 4
+LONGEST_LINE = 1024  #: characters; Fortran's own limit is 132
+SECTIONS = ("pointers", "row numbers", "values")
+MAPPING_FIELDS = 3
+
+
+@dataclass(frozen=True, slots=True)
+class _Header:
+    title: str
+    kind: str
+    shape: tuple[int, int]
+    entries: int
+    lines: tuple[int, ...]  #: of pointers, row numbers and values
+    fields: tuple[tuple[int, int], ...]  #: (fields of a line, characters of a field) of the same
+    first: int  #: index of the first line of pointers
+    right_hand_sides: int  #: lines of right-hand sides
+
+
+def is_harwell_boeing(content: bytes) -> bool:
+    """Tell by the type in the third line."""
+    lines = content[:1024].split(b"\n", 3)
+    return len(lines) > HEADER_LINES - 1 and TYPE.match(lines[2]) is not None and lines[1].split()[:1] != []
+
+
+def read_harwell_boeing(content: bytes) -> RawMatrix:
+    """Read a real assembled matrix.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+
+    Raises
+    ------
+    FileFormatError
+        Another type (pattern, complex, elements), a header that the file does not bear out, pointers or row numbers
+        that do not describe a matrix, fields that are no numbers.
+    """
+    lines = Lines(content)
+    header = _header(lines, len(content))
+    rows, columns = header.shape
+    start = header.first
+    parts: list[FloatArray] = []
+    for number, count in enumerate((columns + 1, header.entries, header.entries)):
+        parts.append(_section(lines, start, header, number, count))
+        start += header.lines[number]
+    pointers, places = whole_numbers(parts[0], "pointers") - 1, whole_numbers(parts[1], "row numbers") - 1
+    lengths = np.diff(pointers)
+    if pointers[0] != 0 or pointers[-1] != header.entries or (lengths < 0).any():
+        msg = (
+            f"the pointers to the columns do not lead through the {header.entries} entries (superelements of ANSYS "
+            "before 11.0 were written so). Write it anew."
+        )
+        raise FileFormatError(msg, path="")
+    words = header.title.lower()
+    letter = next((letter for word, letter in TITLES.items() if words.startswith(word)), None)
+    notes = ("there are right-hand sides, which are not read",) if header.right_hand_sides else ()
+    return assembled(
+        places,
+        np.repeat(np.arange(columns), lengths),
+        parts[2],
+        (rows, columns),
+        declared=SYMMETRIES[header.kind[1]],
+        format=f"Harwell-Boeing {header.kind}",
+        title=header.title,
+        letter=letter,
+        notes=notes,
+    )
+
+
+def read_mapping(content: bytes) -> tuple[str, ...]:
+    r"""Read the names of the equations from an ANSYS mapping file.
+
+    Raises
+    ------
+    FileFormatError
+        A line that is not ``equation, node, label``, or equations that are not numbered from one on.
+
+    Examples
+    --------
+    >>> read_mapping(b"  Matrix Eqn   Node   DOF\n  1   7   UX  \n  2   7   ROTZ\n")
+    ('n7_u1', 'n7_r3')
+    """
+    names: dict[int, str] = {}
+    for number, line in enumerate(content.split(b"\n"), start=1):
+        fields = line.decode("latin-1").split()
+        if not fields or (not names and not fields[0].isdigit()):
+            continue
+        if not (
+            len(fields) == MAPPING_FIELDS and fields[0].isdigit() and fields[1].isdigit() and WORD.match(fields[2])
+        ):
+            msg = f"an equation, a node and a DOF label belong here, not {line[:60].decode('latin-1').strip()!r}."
+            raise FileFormatError(msg, path="", line=number)
+        names[int(fields[0])] = ansys_name(int(fields[1]), fields[2])
+    if not names or set(names) != set(range(1, len(names) + 1)):
+        msg = f"{len(names)} equations that are not numbered from 1 on. The mapping file is damaged or cut short."
+        raise FileFormatError(msg, path="")
+    return tuple([names[equation] for equation in range(1, len(names) + 1)])
+
+
+def _header(lines: Lines, length: int) -> _Header:
+    if len(lines) < HEADER_LINES:
+        msg = "it ends within its header. Write it anew."
+        raise FileFormatError(msg, path="")
+    cards = _numbers(lines[1], 4, 2)
+    kind = lines[2][:3].decode("latin-1").upper()
+    if kind[0] != "R" or kind[1] not in SYMMETRIES or kind[2] != "A":
+        msg = f"it holds a matrix of type {kind!r}; real assembled ones are read (RSA, RUA, RZA)."
+        raise FileFormatError(msg, path="", line=3)
+    rows, columns, entries = _numbers(lines[2][3:], 3, 3)[:3]
+    right_hand_sides = cards[4] if len(cards) > HEADER_LINES else 0
+    first = HEADER_LINES + (right_hand_sides > 0)
+    if max(rows, columns) > max(MOST_ROWS, length) or first + sum(cards[1:4]) > len(lines):
+        msg = (
+            f"it says {rows} x {columns} with {sum(cards[1:4])} lines of data, but has {len(lines)} lines. It is "
+            "damaged or cut short."
+        )
+        raise FileFormatError(msg, path="")
+    return _Header(
+        title=printable(lines[0][:72]),
+        kind=kind,
+        shape=(rows, columns),
+        entries=entries,
+        lines=tuple(cards[1:4]),
+        fields=_descriptors(lines[3]),
+        first=first,
+        right_hand_sides=right_hand_sides,
+    )
+
+
+def _numbers(line: bytes, least: int, number: int) -> list[int]:
+    fields = line.split()
+    if len(fields) < least or not all(field.isdigit() for field in fields):
+        shown = line[:70].decode("latin-1").strip()
+        msg = f"{least} or more counts belong here, not {shown!r}. The file is damaged."
+        raise FileFormatError(msg, path="", line=number)
+    return [int(field) for field in fields]
+
+
+def _descriptors(line: bytes) -> tuple[tuple[int, int], ...]:
+    """Read Fortran format descriptors such as (10I8), (d25.15), (1P,5E16.8)."""
+    found = []
+    texts = [text.decode("latin-1").upper().replace(" ", "") for text in FORMATS.findall(line)[: len(SECTIONS)]]
+    for text in texts:
+        match = DESCRIPTOR.match(text)
+        sound = match is not None and 0 < int(match[2] or 1) * int(match[4]) <= LONGEST_LINE
+        if match is None or not sound or (match[3] == "F" and int(match[1] or 0)):
+            break
+        found.append((int(match[2] or 1), int(match[4])))
+    if len(found) < len(SECTIONS):
+        shown = line.decode("latin-1").strip()[:70]
+        msg = f"the formats of pointers, row numbers and values belong here, as (10I8), not {shown!r}."
+        raise FileFormatError(msg, path="", line=HEADER_LINES)
+    return tuple(found)
+
+
+def _section(lines: Lines, start: int, header: _Header, number: int, count: int) -> FloatArray:
+    """Read one of the three parts."""
+    per_line, width = header.fields[number]
+    needed = -(-count // per_line)
+    if needed != header.lines[number]:
+        msg = (
+            f"{count} {SECTIONS[number]} in fields of {per_line} a line take {needed} lines, but the header says "
+            f"{header.lines[number]}. The file is damaged."
+        )
+        raise FileFormatError(msg, path="")
+    try:
+        values = lines.fields(start, start + needed, width, per_line, count)
+    except ValueError as cause:
+        between = _between_blanks([lines[place] for place in range(start, start + needed)], per_line, count)
+        if between is None:
+            raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number]) from cause
+        values = between
+    if not np.isfinite(values).all():
+        raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number])
+    return values
+
+
+def _between_blanks(part: list[bytes], per_line: int, count: int) -> FloatArray | None:
+    """Read fields that are not as wide as the header says, as `scipy.io.hb_write` (1.17) writes them."""
+    fields = [line.translate(AS_PYTHON).split() for line in part]
+    counts = [per_line] * (len(part) - 1) + [count - per_line * (len(part) - 1)]
+    if [len(found) for found in fields] != counts:
+        return None
+    try:
+        return np.array([field for found in fields for field in found]).astype(np.float64)
+    except ValueError:
+        return None
+
+
+def _bad_field(lines: Lines, where: range, layout: tuple[int, int], what: str) -> FileFormatError:
+    """Find the first line with a field that is no number."""
+    width, per_line = layout
+    for number in where:
+        line = lines[number]
+        filled = min(max(-(-len(line.rstrip()) // width), 1), per_line)
+        try:
+            sound = bool(np.isfinite(fixed_width([line], width, per_line, [filled])).all())
+        except ValueError:
+            sound = False
+        if not sound:
+            msg = f"{what} that are no finite numbers: {line[:60].decode('latin-1').strip()!r}. The file is damaged."
+            return FileFormatError(msg, path="", line=number + 1)
+    return FileFormatError(f"too few {what} in their lines. The file is damaged.", path="", line=where.start + 1)

@@ -1,0 +1,264 @@
+"""Read matrices and names from MATLAB version 5 files, byte by byte and in bounds.
+
+`scipy.io.loadmat` (1.17) follows the lengths that a file states and crashes the interpreter on damaged
+ones; here every length is checked against the bytes that there are. Numbers (full or sparse, real or complex),
+char arrays and cell arrays of chars are read, which is what a model file holds.
+
+Layout (MathWorks, MAT-File Format): a header of 128 bytes, then elements of an 8-byte tag (type, length) and
+data padded to 8 bytes; up to four bytes of data may stand in the tag itself.
+"""
+
+import zlib
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csc_array
+
+from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
+
+Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
+
+HEADER = 128  #: bytes; the last two tell the byte order
+TAG = 8
+MOST_BYTES = 16 * DENSE_ROW_LIMIT**2 + 2**16  #: of one complex matrix with its tags
+PEEK = 2**12  #: bytes that hold the name of a variable
+MATRIX, COMPRESSED = 14, 15
+NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
+CELL, CHAR, SPARSE, OPAQUE = 1, 4, 5, 17
+NUMERIC = range(6, 16)
+COMPLEX_FLAG, LOGICAL_FLAG = 0x800, 0x200
+
+
+def read_mat(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
+    """Read the wanted variables of a MATLAB version 5 file.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+    wanted : collection of str
+        Names; other variables are not looked at.
+
+    Returns
+    -------
+    dict from name to ndarray, csc_array or list of str
+        Char arrays give a text a row, cell arrays of chars a text a cell, without blanks at their ends.
+
+    Raises
+    ------
+    FileFormatError
+        HDF5 (version 7.3), not version 5, a variable of another kind or too large.
+    ValueError, zlib.error
+        The bytes are damaged or end too early.
+    """
+    if content.startswith(b"MATLAB 7.3") or content[HEADER - 4 : HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
+        msg = "this is a MATLAB 7.3 (HDF5) file. Save it with  save(file, ..., '-v7')."
+        raise FileFormatError(msg, path="")
+    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
+    if order is None:
+        msg = "this is no MATLAB version 5 file (or only the beginning of one). Save it with  save(file, ..., '-v7')."
+        raise FileFormatError(msg, path="")
+    found: dict[str, Value] = {}
+    elements = _Bytes(content[HEADER:], order)
+    while elements:
+        kind, data = elements.element()
+        packed = kind == COMPRESSED
+        head = _Head.of(_variable(*(_peeked(data, order) if packed else (kind, data)), order))
+        if head.name in wanted:
+            body = _variable(*(_inflated(data, order) if packed else (kind, data)), order)
+            found[head.name] = _value(_Head.of(body), body)
+    return found
+
+
+class _Bytes:
+    """Elements one after the other; none reaches past the end."""
+
+    def __init__(self, data: bytes, order: str) -> None:
+        self.data, self.order, self.position = data, order, 0
+
+    def __bool__(self) -> bool:
+        return self.position < len(self.data)
+
+    def take(self, count: int) -> bytes:
+        part = self.data[self.position : self.position + count]
+        if len(part) < count:
+            msg = "it ends too early"
+            raise ValueError(msg)
+        self.position += count
+        return part
+
+    def element(self) -> tuple[int, bytes]:
+        """Give type and data of the next element."""
+        tag = self.take(TAG)
+        kind, length = np.frombuffer(tag, self.order + "u4").tolist()
+        if kind >> 16:
+            return kind & 0xFFFF, _Bytes(tag[4:], self.order).take(kind >> 16)
+        data = self.take(length)
+        if kind != COMPRESSED:
+            self.position += -length % TAG
+        return kind, data
+
+    def numbers(self) -> npt.NDArray[Any]:
+        """Give the next element as numbers."""
+        return self.as_numbers(*self.element())
+
+    def as_numbers(self, kind: int, data: bytes) -> npt.NDArray[Any]:
+        if kind not in NUMBERS:
+            msg = f"an element of type {kind} where numbers should be"
+            raise ValueError(msg)
+        return np.frombuffer(data, self.order + NUMBERS[kind])
+
+
+@dataclass(frozen=True, slots=True)
+class _Head:
+    """What stands before the data of a variable."""
+
+    kind: int  #: class of the array
+    is_complex: bool
+    is_logical: bool
+    shape: tuple[int, ...]
+    name: str
+
+    @classmethod
+    def of(cls, body: _Bytes) -> "_Head":
+        flags = int(body.numbers()[0])
+        kind = flags & 0xFF
+        shape = () if kind == OPAQUE else tuple(body.numbers().tolist())
+        _, name = body.element()
+        if any(length < 0 for length in shape):
+            msg = "a negative size"
+            raise ValueError(msg)
+        return cls(kind, bool(flags & COMPLEX_FLAG), bool(flags & LOGICAL_FLAG), shape, name.decode("latin-1"))
+
+
+def _variable(kind: int, data: bytes, order: str) -> _Bytes:
+    if kind != MATRIX:
+        msg = f"an element of type {kind} where a variable should be"
+        raise ValueError(msg)
+    return _Bytes(data, order)
+
+
+def _peeked(data: bytes, order: str) -> tuple[int, bytes]:
+    """Unpack the beginning of a variable."""
+    start = zlib.decompressobj().decompress(data, PEEK)
+    kind, _ = np.frombuffer(_Bytes(start, order).take(TAG), order + "u4").tolist()
+    return kind, start[TAG:]
+
+
+def _inflated(data: bytes, order: str) -> tuple[int, bytes]:
+    """Unpack one variable to its stated length, with its checksum."""
+    stream = zlib.decompressobj()
+    kind, length = np.frombuffer(stream.decompress(data, TAG), order + "u4").tolist()
+    if length > MOST_BYTES:
+        msg = f"a variable has {length} bytes, and only {MOST_BYTES:.0e} are read. Reduce the model first."
+        raise FileFormatError(msg, path="")
+    body = stream.decompress(stream.unconsumed_tail, length + 1)
+    if len(body) != length or not stream.eof:
+        msg = "a packed variable is not as long as it says"
+        raise ValueError(msg)
+    return kind, body
+
+
+def _value(head: _Head, body: _Bytes) -> Value:
+    if head.kind in NUMERIC:
+        return _full(head, body)
+    if head.kind == SPARSE:
+        return _sparse(head, body)
+    if head.kind == CHAR:
+        return _rows(head, body)
+    if head.kind == CELL:
+        return [_cell(head.name, body) for _ in range(_count(head.shape))]
+    msg = (
+        f"{head.name} is a struct, string or other object, where numbers or names should be. Save plain matrices, and "
+        "names as cellstr."
+    )
+    raise FileFormatError(msg, path="")
+
+
+def _count(shape: tuple[int, ...]) -> int:
+    count = 1
+    for length in shape:
+        count *= length
+    return count
+
+
+def _full(head: _Head, body: _Bytes) -> npt.NDArray[Any]:
+    _require_readable(head, _count(head.shape))
+    real = body.numbers()
+    imaginary = body.numbers() if head.is_complex else None
+    return _joined(real, imaginary).reshape(head.shape, order="F")
+
+
+def _joined(real: npt.NDArray[Any], imaginary: npt.NDArray[Any] | None) -> npt.NDArray[Any]:
+    """Join real and imaginary parts without arithmetic, which would lose the signs of zeros."""
+    if imaginary is None:
+        return real
+    values = np.empty(real.shape, dtype=np.complex128)
+    values.real, values.imag = real, imaginary
+    return values
+
+
+def _sparse(head: _Head, body: _Bytes) -> csc_array:
+    """Take over compressed columns, whose indices are checked."""
+    rows, columns = head.shape
+    row, start = body.numbers(), body.numbers().astype(np.int64)
+    real = np.frombuffer(body.element()[1], "u1") if head.is_logical else body.numbers()  # logical: a false type
+    stored = int(start[-1]) if start.size else -1
+    values = _joined(real, body.numbers() if head.is_complex else None)[:stored]
+    row = row[:stored].astype(np.int64)
+    lengths = np.diff(start)
+    sound = start.size == columns + 1 and start[0] == 0 and (lengths >= 0).all() and rows <= MOST_ROWS
+    if not (sound and row.size == values.size == stored and ((row >= 0) & (row < rows)).all()):
+        msg = f"the sparse matrix {head.name} has indices out of bounds"
+        raise ValueError(msg)
+    matrix = csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=(rows, columns))
+    matrix.sum_duplicates()
+    return matrix
+
+
+def _require_readable(head: _Head, entries: int) -> None:
+    if entries > DENSE_ROW_LIMIT**2:
+        msg = (
+            f"{head.name} is larger than {DENSE_ROW_LIMIT} x {DENSE_ROW_LIMIT}, and matrices are held dense here. "
+            "Reduce the model first."
+        )
+        raise FileFormatError(msg, path="")
+
+
+def _cell(name: str, body: _Bytes) -> str:
+    kind, data = body.element()
+    if kind == MATRIX and not data:
+        return ""
+    inner = _Bytes(data, body.order)
+    head = _Head.of(inner)
+    if kind != MATRIX or head.kind != CHAR or head.shape[0] > 1:
+        msg = f"{name} must be a cell array of names, one char row each (in MATLAB a cellstr)."
+        raise FileFormatError(msg, path="")
+    return next(iter(_rows(head, inner)), "")
+
+
+def _rows(head: _Head, body: _Bytes) -> list[str]:
+    """Read a char array, which is stored by columns, as one text a row."""
+    kind, data = body.element()
+    if kind in TEXTS:
+        ending = {"<": "-le", ">": "-be"}[body.order] if kind in (17, 18) else ""
+        text = data.decode(TEXTS[kind] + ending)
+    else:
+        text = body.as_numbers(kind, data).astype("<u2").tobytes().decode("utf-16-le")
+    letters = np.array(list(text), dtype=np.str_) if len(text) == _count(head.shape) else _units(text)
+    return [
+        "".join(row).encode("utf-16-le", "surrogatepass").decode("utf-16-le").rstrip(" ")
+        for row in letters.reshape(head.shape, order="F").tolist()
+    ]
+
+
+def _units(text: str) -> npt.NDArray[np.str_]:
+    """Split a text into the 16-bit units that MATLAB counts."""
+    units = np.frombuffer(text.encode("utf-16-le"), "<u2").tolist()
+    return np.array([chr(unit) for unit in units], dtype=np.str_)

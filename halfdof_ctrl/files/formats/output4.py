@@ -1,0 +1,351 @@
+"""OUTPUT4 files of Nastran, text or binary.
+
+A file holds matrices one after the other. A header (columns, rows, form, type, name) is followed by columns, each with
+its number, the first row and the count of words, and a last one whose number is one more than there are columns:
+
+    dense        first row > 0     then the values from that row on
+    sparse       first row 0       then strings of (length and row in one word) and values, up to 65535 rows
+    big sparse   rows < 0          then strings of (length, row) and values
+
+In binary each record stands between two counts of its bytes (little or big endian, words of 4 or 8 bytes). All counts
+are checked against the bytes or lines that there are. Form 6 is symmetric; types 1, 2 are real (single, double), 3, 4
+complex. Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
+"""
+
+import re
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
+from halfdof_ctrl.files.formats.text_blocks import Lines, fixed_width, printable
+
+SYMMETRIC_FORM = 6
+COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
+MARK = 4  #: bytes of a record's length
+HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
+BIG = 65536  #: rows from which a sparse matrix is stored in the big form
+NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
+DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
+CUT = "it ends within a matrix. The file is cut short."
+DAMAGED = "The file is damaged."
+LONGEST_LINE = 1024  #: characters
+
+
+@dataclass(slots=True)
+class _Matrix:
+    """A matrix while it is read: strings of values that stand below each other in a column."""
+
+    name: str
+    shape: tuple[int, int]
+    form: int
+    type: int
+    big: bool
+    rows: list[int] = field(default_factory=list)  #: first row of each string, from one on
+    columns: list[int] = field(default_factory=list)
+    counts: list[int] = field(default_factory=list)  #: values of each string
+
+    @property
+    def per_value(self) -> int:
+        """Real numbers of a value."""
+        return 2 if self.type in COMPLEX_TYPES else 1
+
+    def add(self, column: int, row: int, count: int) -> None:
+        """Note where the next values belong, `column` and `row` counted from one."""
+        self.columns.append(column)
+        self.rows.append(row)
+        self.counts.append(count)
+
+    def finished(self, numbers: npt.NDArray[Any], words: str) -> RawMatrix:
+        """Put the numbers to their places."""
+        columns, rows, counts = (np.array(part, dtype=np.int64) for part in (self.columns, self.rows, self.counts))
+        outside = (
+            (columns < 1) | (columns > self.shape[1]) | (rows < 1) | (counts < 0) | (rows - 1 + counts > self.shape[0])
+        )
+        if outside.any():
+            first = int(np.argmax(outside))
+            msg = (
+                f"{counts[first]} values from row {rows[first]} of column {columns[first]} in {self.name}, which is "
+                f"{self.shape[0]} x {self.shape[1]}. {DAMAGED}"
+            )
+            raise FileFormatError(msg, path="")
+        if not np.isfinite(numbers).all():
+            msg = f"{self.name} has entries that are not finite. {DAMAGED}"
+            raise FileFormatError(msg, path="")
+        values = numbers[0::2] + 1j * numbers[1::2] if self.per_value > 1 else numbers
+        declared: Declared = "symmetric" if self.form == SYMMETRIC_FORM else "unsaid"
+        return assembled(
+            runs(rows - 1, counts),
+            np.repeat(columns - 1, counts),
+            values,
+            self.shape,
+            declared=declared if self.shape[0] == self.shape[1] else "unsaid",
+            format=f"Nastran OUTPUT4 {words}, form {self.form}",
+            title=self.name,
+        )
+
+
+def runs(starts: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Join runs of consecutive numbers.
+
+    >>> runs(np.array([5, 1]), np.array([2, 3])).tolist()
+    [5, 6, 1, 2, 3]
+    """
+    before = np.cumsum(lengths) - lengths
+    return np.asarray(np.arange(int(lengths.sum())) + np.repeat(starts - before, lengths))
+
+
+def is_binary_output4(content: bytes) -> bool:
+    """Tell by the count of bytes of the first header."""
+    return _byte_order(content) is not None
+
+
+def is_text_output4(content: bytes) -> bool:
+    """Tell by the four integers, the name and the format in the first line."""
+    return re.match(rb"^[ \d]{7}\d[ \d-]{7}\d {6,7}\d {6,7}[1-4][A-Za-z]", content[:80]) is not None
+
+
+def read_output4(content: bytes) -> list[RawMatrix]:
+    """Read all matrices of a file.
+
+    Raises
+    ------
+    FileFormatError
+        A header, a record or a string of values that contradicts the file or the matrix's size, numbers that are not
+        finite, no matrix at all.
+    """
+    order = _byte_order(content)
+    found = list(_text_matrices(Lines(content)) if order is None else _binary_matrices(content, order))
+    if not found:
+        msg = "no matrix in it. Write it by OUTPUT4 or EXTSEOUT(ASMBULK,EXTBULK,DMIGOP2 or MATOP4)."
+        raise FileFormatError(msg, path="")
+    return found
+
+
+def _opened(numbers: tuple[int, ...], name: str, length: int) -> _Matrix:
+    columns, rows, form, kind = numbers
+    sound = 0 < columns <= max(MOST_ROWS, length) and 0 < abs(rows) <= max(MOST_ROWS, length) and kind in TYPES
+    if not sound:
+        msg = f"a header with {columns} columns, {rows} rows and type {kind}. {DAMAGED}"
+        raise FileFormatError(msg, path="")
+    return _Matrix(name.lower(), (abs(rows), columns), form, kind, big=rows < 0 or rows >= BIG)
+
+
+def _byte_order(content: bytes) -> str | None:
+    for order in "<>":
+        if int(np.frombuffer(content[:MARK].ljust(MARK, b"\0"), order + "u4")[0]) in HEADER_BYTES:
+            return order
+    return None
+
+
+def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
+    records = _records(content, order)
+    for start, stop in records:
+        word = HEADER_BYTES.get(stop - start)
+        if word is None:
+            msg = f"a record of {stop - start} bytes where a header should be. {DAMAGED}"
+            raise FileFormatError(msg, path="")
+        integer = np.dtype(f"{order}i{word}")
+        name = printable(content[start + 4 * word : stop])
+        matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, len(content))
+        real = np.dtype(f"{order}f8" if matrix.type in DOUBLE_TYPES else f"{order}f{word}")
+        places: list[int] = []
+        for begin, end in records:
+            if end - begin < 3 * word:
+                msg = f"a record of {end - begin} bytes where a column should be. {DAMAGED}"
+                raise FileFormatError(msg, path="")
+            column, row, words = np.frombuffer(content, integer, 3, begin).tolist()
+            if column > matrix.shape[1]:
+                break
+            if words * word != end - begin - 3 * word:
+                size = f"{words} words, but its record has {end - begin} bytes"
+                msg = f"column {column} of {matrix.name} says {size}. {DAMAGED}"
+                raise FileFormatError(msg, path="")
+            data = begin + 3 * word
+            if row > 0:
+                _note(matrix, places, (column, row, words), (data, word, real.itemsize))
+            else:
+                numbers = np.frombuffer(content, integer, words, data).tolist()
+                _sparse_column(matrix, places, (column, numbers), (data, word, real.itemsize))
+        else:
+            raise FileFormatError(CUT, path="")
+        yield matrix.finished(_gathered(content, matrix, places, real), "binary")
+
+
+def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
+    """Give where records begin and end, each of which stands between two equal counts of its bytes."""
+    mark = struct.Struct(f"{order}I")
+    place = 0
+    while place < len(content):
+        stop = place + MARK + mark.unpack(content[place : place + MARK].ljust(MARK, b"\0"))[0]
+        closing = content[stop : stop + MARK]
+        if len(closing) < MARK:
+            raise FileFormatError(CUT, path="")
+        if closing != content[place : place + MARK] or (stop - place) % MARK:
+            msg = f"the record at byte {place} does not end as it begins. {DAMAGED}"
+            raise FileFormatError(msg, path="")
+        yield place + MARK, stop
+        place = stop + MARK
+
+
+def _sparse_column(
+    matrix: _Matrix, places: list[int], words: tuple[int, list[int]], sizes: tuple[int, int, int]
+) -> None:
+    """Follow the strings of a column through its words."""
+    column, numbers = words
+    data, word, real = sizes
+    place = 0
+    while place < len(numbers):
+        if matrix.big:
+            length, row = numbers[place], numbers[place + 1] if place + 1 < len(numbers) else 0
+            place += 2
+        else:
+            length, row = numbers[place] >> 16, numbers[place] & 0xFFFF
+            place += 1
+        if length < 1 or place + length - 1 > len(numbers):
+            msg = f"a string of {length} words in column {column} of {matrix.name}. {DAMAGED}"
+            raise FileFormatError(msg, path="")
+        _note(matrix, places, (column, row, length - 1), (data + place * word, word, real))
+        place += length - 1
+
+
+def _note(matrix: _Matrix, places: list[int], where: tuple[int, int, int], sizes: tuple[int, int, int]) -> None:
+    """Note a string of words at a byte of the file."""
+    column, row, words = where
+    data, word, real = sizes
+    count, rest = divmod(words * word, real * matrix.per_value)
+    if rest:
+        msg = f"{words} words in column {column} of {matrix.name} are no whole values. {DAMAGED}"
+        raise FileFormatError(msg, path="")
+    matrix.add(column, row, count)
+    places.append(data)
+
+
+def _gathered(content: bytes, matrix: _Matrix, places: list[int], real: np.dtype[Any]) -> npt.NDArray[np.float64]:
+    """Take the values of all strings out of the file at once; records lie on multiples of four bytes."""
+    quarters = np.frombuffer(content, "u4", len(content) // MARK)
+    per_value = real.itemsize * matrix.per_value // MARK
+    lengths = np.array(matrix.counts, dtype=np.int64) * per_value
+    chosen = quarters[runs(np.array(places, dtype=np.int64) // MARK, lengths)]
+    return chosen.view(real).astype(np.float64)
+
+
+def _text_matrices(lines: Lines) -> Iterator[RawMatrix]:
+    number = 0
+    while number < len(lines) and lines[number].strip():
+        matrix, per_line, width = _text_header(lines[number].decode("latin-1").rstrip(), len(lines.content), number)
+        number += 1
+        parts: list[bytes] = []
+        counts: list[int] = []
+        while True:
+            column, row, words = _integers(lines, number, 3)
+            if column > matrix.shape[1]:
+                break
+            number = _text_column(matrix, lines, number, (column, row, words), (per_line, parts, counts))
+        number += 1 + -(-words // per_line)  # with the value of the last column, which means nothing
+        if number > len(lines):
+            raise FileFormatError(CUT, path="")
+        try:
+            numbers = fixed_width(parts, width, per_line, counts) if parts else np.zeros(0)
+        except ValueError as cause:
+            msg = f"{matrix.name} has entries that are no numbers. {DAMAGED}"
+            raise FileFormatError(msg, path="") from cause
+        yield matrix.finished(numbers, "text")
+
+
+def _text_header(line: str, length: int, number: int) -> tuple[_Matrix, int, int]:
+    wide = line.endswith("|I16")
+    stops = (16, 32, 40, 48, 56) if wide else (8, 16, 24, 32, 40)
+    cuts = [line[start:stop] for start, stop in zip((0, *stops), stops, strict=False)]
+    try:
+        numbers = tuple(int(cut) for cut in cuts[:4])
+    except ValueError as cause:
+        msg = f"columns, rows, form, type and name of a matrix belong here, not {line[:60]!r}. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1) from cause
+    match = NUMBER_FORMAT.match(line[stops[-1] :].strip().upper())
+    per_line, width = DEFAULT_FORMAT if match is None else (int(match[1]), int(match[2]))
+    if not 0 < per_line * width <= LONGEST_LINE:
+        msg = f"the number format {line[stops[-1] :].strip()!r} is none of OUTPUT4. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1)
+    return _opened(numbers, printable(cuts[4].encode("latin-1")), length), per_line, width
+
+
+def _integers(lines: Lines, number: int, count: int) -> list[int]:
+    """Read integers of eight characters."""
+    if number >= len(lines):
+        raise FileFormatError(CUT, path="")
+    line = lines[number]
+    try:
+        return [int(line[8 * i : 8 * i + 8]) for i in range(count)]
+    except ValueError as cause:
+        msg = f"{count} integers of 8 characters belong here, not {line[:60].decode('latin-1')!r}. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1) from cause
+
+
+def _text_column(
+    matrix: _Matrix,
+    lines: Lines,
+    number: int,
+    head: tuple[int, int, int],
+    into: tuple[int, list[bytes], list[int]],
+) -> int:
+    """Collect the lines of a column and give the number of the line after it."""
+    column, row, words = head
+    if words < 0:
+        msg = f"a column of {words} words. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1)
+    number += 1
+    if row > 0:
+        return _text_string(matrix, lines, number, (column, row, words), into)
+    per_number = 2 if matrix.type in DOUBLE_TYPES else 1
+    while words > 0:
+        if matrix.big:
+            length, start = _integers(lines, number, 2)
+            words -= length + 1
+        else:
+            if number >= len(lines):
+                raise FileFormatError(CUT, path="")
+            packed = _packed(lines[number], number)
+            length, start = packed >> 16, packed & 0xFFFF
+            words -= length
+        if length < 1 or words < 0:
+            msg = f"a string of {length} words in column {column} of {matrix.name}. {DAMAGED}"
+            raise FileFormatError(msg, path="", line=number + 1)
+        number = _text_string(matrix, lines, number + 1, (column, start, (length - 1) // per_number), into)
+    return number
+
+
+def _packed(line: bytes, number: int) -> int:
+    try:
+        return int(line)
+    except ValueError as cause:
+        msg = f"an integer belongs here, not {line[:60].decode('latin-1')!r}. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1) from cause
+
+
+def _text_string(
+    matrix: _Matrix,
+    lines: Lines,
+    number: int,
+    where: tuple[int, int, int],
+    into: tuple[int, list[bytes], list[int]],
+) -> int:
+    """Collect the lines of consecutive numbers."""
+    column, row, count = where
+    per_line, parts, counts = into
+    stop = number + -(-count // per_line)
+    if stop > len(lines):
+        raise FileFormatError(CUT, path="")
+    if count % matrix.per_value:
+        msg = f"{count} numbers in column {column} of {matrix.name} are no whole complex values. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number)
+    matrix.add(column, row, count // matrix.per_value)
+    for place in range(number, stop):
+        parts.append(lines[place])
+        counts.append(min(per_line, count - per_line * (place - number)))
+    return stop

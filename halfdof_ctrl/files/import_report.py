@@ -1,0 +1,197 @@
+"""What was found in files: sizes, symmetry, rank and definiteness, mass per direction, kinds of DOFs.
+
+These are the looks that find the usual faults of exported matrices before they become wrong frequencies: a triangle
+that is missing, a mass in other units, a DOF with mass that nothing holds, a boundary condition as a huge spring, a
+damping file that was forgotten.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csc_array
+
+from halfdof_ctrl.files.definiteness import Inertia, inertia
+from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.files.formats.raw_matrix import Storage
+
+SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
+PENALTY = 1e35  #: a stiffness from here on is a boundary condition; Abaqus writes 1e36
+WHAT = {"M": "mass", "C": "damping", "K": "stiffness", "S": "structural damping"}
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class MatrixReport:
+    """What was found about one matrix."""
+
+    letter: str  #: M, C, K or S (structural damping, the imaginary part of K)
+    source: str  #: the file, and its name for the matrix
+    format: str
+    shape: tuple[int, int]
+    nonzero: int  #: entries, with those of a triangle that was filled in
+    stored: Storage  #: which off-diagonal entries the file holds
+    completed: bool  #: whether a triangle was filled in
+    half_stored: bool  #: whether a triangle seems to be missing
+    is_complex: bool
+    asymmetry: float  #: largest entry of A - A^T over the largest of A
+    skew: bool  #: whether A = -A^T
+    null_columns: int
+    inertia: Inertia  #: of the symmetric real part
+    notes: tuple[str, ...]
+    doubts: tuple[str, ...]  #: what may be wrong with the file
+
+    @property
+    def symmetry(self) -> str:
+        """Symmetry in words."""
+        if self.skew:
+            return "skew-symmetric"
+        return "symmetric" if self.asymmetry <= SYMMETRIC else f"unsymmetric ({self.asymmetry:.0e})"
+
+    @property
+    def rank(self) -> str:
+        """Rank and definiteness in words."""
+        known = self.inertia.rank
+        part = "" if self.asymmetry <= SYMMETRIC and not self.is_complex else " (of the symmetric real part)"
+        return self.inertia.in_words + part + ("" if known is None else f", rank {known}")
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class ImportReport:
+    """What was found in the files of a model. Prints as a small table."""
+
+    files: tuple[str, ...]
+    matrices: tuple[MatrixReport, ...]
+    n_dofs: int
+    labelled: bool  #: whether the files name their DOFs
+    missing: tuple[str, ...]  #: letters among M, C, K for which there is no matrix
+    unused: tuple[str, ...]  #: what else is in the files
+    n_inertial: int  #: DOFs whose column of M is not null
+    n_half: int  #: of the others, those whose column of C is not null
+    n_static: int  #: the rest
+    mass: Mapping[str, float]  #: sum of M over the translations u1, u2, u3 of all nodes
+    unsupported: tuple[str, ...]  #: DOFs with mass or damping whose column of K is null
+    empty: tuple[str, ...]  #: DOFs whose columns are null in all matrices
+    penalized: tuple[str, ...]  #: DOFs with a stiffness of 1e35 or more
+    removed: tuple[str, ...]  #: of these, the ones that were taken out on request
+    notes: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is probably not as it was meant, one sentence each."""
+        found = [
+            f"{part.letter} ({part.source}) has no off-diagonal entry whose partner across the diagonal is stored, and "
+            "the file does not say that it is symmetric: half of it seems to be missing. If it is symmetric, pass "
+            f"triangle={'lower' if part.stored == 'lower' else 'upper'!r}."
+            for part in self.matrices
+            if part.half_stored
+        ]
+        found += [f"{part.source} {doubt}." for part in self.matrices for doubt in part.doubts]
+        found += [
+            f"{part.letter} ({part.source}) is {part.inertia.in_words}: {part.inertia.negative} eigenvalues of its "
+            "symmetric part are negative."
+            for part in self.matrices
+            if part.inertia.negative and not part.half_stored
+        ]
+        if self.penalized and not self.removed:
+            found.append(
+                f"{len(self.penalized)} DOFs have a stiffness of {PENALTY:.0e} or more, which stands for a boundary "
+                f"condition ({listed(self.penalized)}). Pass remove_fixed=True to take them out."
+            )
+        if self.unsupported:
+            found.append(
+                f"{len(self.unsupported)} DOFs have mass or damping but no stiffness ({listed(self.unsupported)})."
+            )
+        if self.empty:
+            found.append(
+                f"{len(self.empty)} DOFs have no entry in any matrix ({listed(self.empty)}): they move without a "
+                "force, and the model has no state space. Remove them."
+            )
+        return tuple(found)
+
+    def __repr__(self) -> str:
+        """Give the table."""
+        names = "named by node and component" if self.labelled else "without names in the files"
+        lines = [f"{type(self).__name__}: {self.n_dofs} DOFs, {names}", *_table(self.matrices)]
+        lines += [f"  {letter}  no {WHAT[letter]} in the files: taken as zero" for letter in self.missing]
+        lines.append(f"  DOFs by null columns: {self.n_inertial} inertial, {self.n_half} half, {self.n_static} static")
+        if self.mass:
+            lines.append("  sum of M: " + ", ".join(f"{size:.6g} along {name}" for name, size in self.mass.items()))
+        lines.append(f"  files: {', '.join(self.files)}")
+        if self.unused:
+            lines.append(f"  not used: {listed(self.unused)}")
+        if self.removed:
+            lines.append(f"  removed as fixed: {listed(self.removed)}")
+        lines += [f"  note: {part.letter}: {note}" for part in self.matrices for note in part.notes]
+        lines += [f"  note: {note}" for note in self.notes]
+        lines += [f"  WARNING: {text}" for text in self.warnings]
+        return "\n".join(lines)
+
+
+def _table(matrices: Sequence[MatrixReport]) -> list[str]:
+    rows = [("", "from", "size", "nonzero", "stored", "symmetry", "definiteness")]
+    for part in matrices:
+        stored = {"either": "one of each pair", "both": "full"}.get(part.stored, part.stored)
+        words = f"{stored}, completed" if part.completed else stored
+        size = f"{part.shape[0]} x {part.shape[1]}"
+        rows.append((part.letter, part.source, size, str(part.nonzero), words, part.symmetry, part.rank))
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  " + "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True)).rstrip() for row in rows
+    ]
+
+
+def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **found: Any) -> MatrixReport:  # noqa: ANN401
+    """Look at one square matrix.
+
+    Parameters
+    ----------
+    letter, source : str
+    matrix : (n, n) csc_array
+    largest : int
+        Components with more rows are not factorized for the rank.
+    **found
+        format, stored, completed, half_stored, notes and doubts, as the reader found them.
+    """
+    real = csc_array(matrix.real)
+    largest_entry = float(np.abs(matrix.data).max(initial=0.0))
+    difference, total = abs(matrix - matrix.T), abs(matrix + matrix.T)
+    scale = largest_entry or 1.0
+    return MatrixReport(
+        letter=letter,
+        source=source,
+        shape=(matrix.shape[0], matrix.shape[1]),
+        nonzero=int(matrix.nnz),
+        is_complex=bool(np.iscomplexobj(matrix.data)),
+        asymmetry=float(difference.max()) / scale if difference.nnz else 0.0,
+        skew=bool(difference.nnz) and float(total.max() if total.nnz else 0.0) <= SYMMETRIC * scale,
+        null_columns=int(np.count_nonzero(~has_entries(matrix))),
+        inertia=inertia(real, largest),
+        **found,
+    )
+
+
+def has_entries(matrix: csc_array) -> npt.NDArray[np.bool_]:
+    """Tell which columns are not null."""
+    return np.diff(matrix.indptr) > 0
+
+
+def mass_per_direction(mass: csc_array | None, dofs: Sequence[str]) -> dict[str, float]:
+    """Sum M over the translations of all nodes in each direction, where DOFs have directions.
+
+    Examples
+    --------
+    >>> mass_per_direction(csc_array(np.diag([2.0, 3.0, 3.0])), ["n1_u1", "n2_u1", "n2_u2"])
+    {'u1': 5.0, 'u2': 3.0}
+    """
+    if mass is None:
+        return {}
+    directions = np.array([direction_of(name) or "" for name in dofs])
+    sums = {}
+    for direction in TRANSLATIONS:
+        chosen = (directions == direction).astype(np.float64)
+        if chosen.any():
+            sums[direction] = float(np.real(chosen @ (mass @ chosen)))
+    return sums

@@ -1,0 +1,131 @@
+"""Why a pencil is singular: which DOFs its null vectors move and which equations they combine.
+
+This serves the words of a refusal alone, so the reduction and the oracle may both ask; whether a pencil is
+singular each of them decides by itself.
+
+At a generic point, the null space of P(s) on the right holds the motions that take no force, that on the left the
+combinations of equations that say nothing. Its support does not depend on the basis, nor does its finest
+split into parts that share no DOF: these are the connected components of any basis in echelon form, each of which
+is a cause of its own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+from halfdof_ctrl.base.arrays import Matrix, powers_of_two
+from halfdof_ctrl.model.refusals import Cause, Kind
+
+NULL = 64 * float(np.finfo(float).eps)  #: times the size: singular values below this part of the largest are zero
+SWEEPS = 10  #: of scaling, rows and columns in turns
+NULL_VECTOR_SHARE = 1e-6  #: what has more than this share of a null vector in echelon form takes part in it
+
+Group: TypeAlias = frozenset[int]
+
+SINGLE: tuple[Kind, ...] = ("unattached", "unused", "empty")
+WITH_THEIR_EQUATIONS: tuple[Kind, ...] = ("unattached", "floating", "redundant")
+PAIR = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NullSpaces:
+    """Independent groups of unknowns and of equations that take part in null vectors of a matrix."""
+
+    unknowns: tuple[Group, ...]
+    equations: tuple[Group, ...]
+    dimension: int  #: of either null space
+    smallest: float  #: singular value of the matrix in scaled rows and columns, relative to the largest
+
+
+def null_spaces(P: Matrix) -> NullSpaces:
+    """Find the null spaces of a square matrix that is singular."""
+    left, values, right = scipy.linalg.svd(_scaled(P))
+    dimension = max(1, int(np.count_nonzero(values <= NULL * values.size * values[0])))
+    return NullSpaces(
+        unknowns=_groups(right[-dimension:].conj().T),
+        equations=_groups(left[:, -dimension:]),
+        dimension=dimension,
+        smallest=float(values[-1] / values[0]) if values[0] > 0.0 else 0.0,
+    )
+
+
+def causes(null: NullSpaces, coefficients: Sequence[Matrix], dofs: Sequence[str]) -> list[Cause]:
+    """Put each group into words that a mechanical engineer knows.
+
+    Parameters
+    ----------
+    null : NullSpaces
+        Of ``K + C s + M s^2`` at a generic point.
+    coefficients : (K, C, M)
+    dofs : sequence of str
+        Names of the unknowns and of the equations.
+    """
+    groups: list[tuple[Kind, Group]] = [
+        (_kind_of_unknowns(group, null, coefficients), group) for group in null.unknowns
+    ]
+    told = {group for kind, group in groups if kind in WITH_THEIR_EQUATIONS}
+    groups += [(_kind_of_equations(group, coefficients), group) for group in null.equations if group not in told]
+    found: list[Cause] = []
+    for single in SINGLE:
+        members = sorted(frozenset[int]().union(*(group for kind, group in groups if kind == single)))
+        if members:
+            found.append(Cause(single, tuple([dofs[index] for index in members])))
+    for kind, group in groups:
+        if kind not in SINGLE:
+            found.append(Cause(kind, tuple([dofs[index] for index in sorted(group)])))
+    return found
+
+
+def _scaled(P: Matrix) -> Matrix:
+    """Bring the largest entries of rows and columns near one."""
+    for _ in range(SWEEPS):
+        P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=1, initial=0.0)))[:, None]
+        P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=0, initial=0.0)))
+    return P
+
+
+def _groups(basis: Matrix) -> tuple[Group, ...]:
+    """Split a space into the parts that share no coordinate, each given by the coordinates it moves."""
+    _, _, order = scipy.linalg.qr(basis.conj().T, pivoting=True, mode="economic")
+    pivots = order[: basis.shape[1]]
+    echelon = np.abs(np.linalg.solve(basis[pivots].T, basis.T))
+    takes_part = echelon > NULL_VECTOR_SHARE * echelon.max(axis=1, keepdims=True)
+    vectors, coordinates = takes_part.shape
+    graph = np.zeros((vectors + coordinates, vectors + coordinates), dtype=bool)
+    graph[:vectors, vectors:] = takes_part
+    _, labels = connected_components(csr_array(graph), directed=False)
+    groups = [
+        frozenset(np.flatnonzero(labels[vectors:] == label).tolist()) for label in dict.fromkeys(labels[:vectors])
+    ]
+    return tuple(sorted(groups, key=min))
+
+
+def _kind_of_unknowns(group: Group, null: NullSpaces, coefficients: Sequence[Matrix]) -> Kind:
+    members = sorted(group)
+    if len(members) == 1:
+        return "unused" if any(matrix[members].any() for matrix in coefficients) else "unattached"
+    if group not in null.equations:
+        return "free"
+    stiffness, *moving = coefficients
+    if not stiffness[np.ix_(members, members)].any() and not any(matrix[:, members].any() for matrix in moving):
+        return "redundant"
+    return "floating" if _is_constant(np.vstack([matrix[:, members] for matrix in coefficients])) else "free"
+
+
+def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
+    members = sorted(group)
+    if len(members) == 1:
+        return "empty"
+    rows = np.hstack([matrix[members] for matrix in coefficients])
+    return "identical" if len(members) == PAIR and _is_constant(rows.T) else "dependent"
+
+
+def _is_constant(columns: Matrix) -> bool:
+    """Tell whether columns of K, C and M on top of each other are dependent, so that a null vector holds at every s."""
+    values = scipy.linalg.svdvals(_scaled(columns))
+    return bool(values[-1] <= NULL * max(columns.shape) * values[0])

@@ -1,0 +1,274 @@
+"""Evaluate equation (1) for sparse models: one factorization at each point, the order of elimination found once.
+
+The coefficients of P(s) are put on one pattern. At the first point SuperLU orders it (X. S. Li, 2005): where the
+pattern is nearly symmetric by minimum degree of ``P + P^T``, with pivots on the diagonal, else by columns with partial
+pivoting. All points after it are factorized in that order. Pivots on the diagonal are safe as long as they do not
+vanish; whether they did is seen from the residual, and a point where it is not small gets stricter pivots.
+Solved is for the inputs, or with the transpose for the outputs, whichever are fewer.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import SuperLU, splu
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.base.progress import progress
+from halfdof_ctrl.base.sparse_arrays import (
+    SparseMatrix,
+    as_sparse,
+    column_of_entries,
+    largest_by_row_and_column,
+    times,
+)
+from halfdof_ctrl.base.threads import limited_threads
+
+Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
+Pivoting: TypeAlias = tuple[Literal["MMD_AT_PLUS_A", "COLAMD"], float]  #: order, least pivot over the column's largest
+
+WIDTH = 8  #: right-hand sides worked at a time
+MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
+REFINED = 64 * np.finfo(float).eps  #: componentwise backward error above which a solution is corrected once
+UNSAFE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
+SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
+PIVOTINGS: tuple[Pivoting, ...] = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))
+
+
+@limited_threads(1)
+def sparse_transfer(
+    P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray
+) -> ComplexArray:
+    """Evaluate ``F(s) P(s)^-1 B(s) + D(s)`` at every point, with a progress bar where it takes long.
+
+    Parameters
+    ----------
+    P, B, F, D : sequences of (n, n), (n, m), (p, n), (p, m) csc_arrays
+        Coefficients of 1, s, s^2.
+    points : (k,) complex ndarray
+        Where to evaluate [rad/s].
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+        ``inf + nan j`` in every entry where ``P(s)`` is exactly singular.
+
+    Raises
+    ------
+    ModelSizeError
+        The response would have more than 2^27 entries.
+    """
+    p, m = D[0].shape
+    require_room(p, m, points.size)
+    values = np.empty((p, m, points.size), dtype=np.complex128)
+    transfer = SparseTransfer(P, B, F, D)
+    for k, s in enumerate(progress(points.tolist(), "frequencies")):
+        values[:, :, k] = transfer.at(s)
+    return values
+
+
+def require_room(p: int, m: int, points: int) -> None:
+    """Refuse a response that is too large to be held.
+
+    Raises
+    ------
+    ModelSizeError
+        More than 2^27 complex entries.
+    """
+    if p * m * points > MOST_VALUES:
+        msg = (
+            f"The response of {p} outputs to {m} inputs at {points} points would take "
+            f"{1.6e-8 * p * m * points:.3g} GB. Select the inputs and outputs that matter: "
+            "model.select(inputs=[...], outputs=[...])."
+        )
+        raise ModelSizeError(msg, size=p * m * points, limit=MOST_VALUES)
+
+
+class SparseTransfer:
+    """``F(s) P(s)^-1 B(s) + D(s)`` of a sparse model, point by point."""
+
+    def __init__(self, P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients) -> None:
+        self.turned = F[0].shape[0] < B[0].shape[1]  #: whether the transpose is solved, for the outputs
+        parts = (P, F, B, D) if self.turned else (P, B, F, D)
+        square, self.B, self.F, self.D = (
+            [csc_array(as_sparse(X).T) if self.turned else as_sparse(X) for X in part] for part in parts
+        )
+        pencil = SparsePencil.on_one_pattern(square)
+        self.pivotings = PIVOTINGS if pencil.is_nearly_symmetric else PIVOTINGS[-1:]
+        self.pencils = [pencil] * len(self.pivotings)  #: in the order found for each way of pivoting
+        self.growth = 0.0  #: of a random solution at the first point, relative to the scaled P(s)
+
+    def at(self, s: complex) -> ComplexArray:
+        """Evaluate at one point [rad/s]: (p, m)."""
+        value = np.full(self.D[0].shape, complex(np.inf, np.nan))
+        with np.errstate(all="ignore"):
+            B, F, D = (_polynomial(part, s) for part in (self.B, self.F, self.D))
+            for way in range(len(self.pivotings)):
+                try:
+                    motion, backward_error = self._times_solution(F, B, s, way)
+                except RuntimeError:  # exactly singular
+                    self.growth = np.inf
+                    break
+                if backward_error <= UNSAFE or way == len(self.pivotings) - 1:
+                    value = np.asarray(motion + D.toarray())
+                    break
+        value[~np.isfinite(value)] = complex(np.inf, np.nan)
+        return np.asarray(value.T if self.turned else value)
+
+    def _times_solution(self, F: SparseMatrix, B: SparseMatrix, s: complex, way: int) -> tuple[ComplexArray, float]:
+        """Give ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
+        factors = self._factorized(s, way)
+        product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
+        worst = 0.0
+        for start in range(0, B.shape[1], WIDTH):
+            solution, backward_error = factors.solve(B[:, start : start + WIDTH].toarray())
+            product[:, start : start + WIDTH] = times(F, solution)
+            worst = max(worst, backward_error)
+        return product, worst
+
+    def _factorized(self, s: complex, way: int) -> "PointFactors":
+        """Factorize P(s) in one way, in the order of the first point that was."""
+        pencil, (ordering, threshold) = self.pencils[way], self.pivotings[way]
+        factors = PointFactors.of(pencil, s, "NATURAL" if pencil.is_ordered else ordering, threshold)
+        if not pencil.is_ordered:
+            order = np.argsort(factors.lu.perm_c)
+            self.pencils[way] = pencil.in_order(None if ordering == "COLAMD" else order, order)
+            self.growth = max(self.growth, factors.growth())
+        return factors
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SparsePencil:
+    """Coefficients of a square matrix polynomial on one pattern of compressed columns."""
+
+    values: tuple[npt.NDArray[Any] | None, ...]  #: entries of the coefficients of 1, s, s^2, None for zeros
+    indices: npt.NDArray[np.int32]
+    indptr: npt.NDArray[np.int32]
+    rows: npt.NDArray[np.intp] | None  #: which row of P stands where, None for all in their places
+    columns: npt.NDArray[np.intp] | None  #: likewise
+    is_ordered: bool
+
+    @classmethod
+    def on_one_pattern(cls, coefficients: Sequence[SparseMatrix]) -> "SparsePencil":
+        """Put coefficients of 1, s, s^2 on the union of their patterns."""
+        patterns = [csc_array((np.ones(X.nnz), X.indices, X.indptr), shape=X.shape) for X in coefficients]
+        union = csc_array(patterns[0] + patterns[1] + patterns[2])
+        union.sort_indices()
+        union.data = np.arange(1.0, union.nnz + 1.0)
+        values: list[npt.NDArray[Any] | None] = []
+        for X, pattern in zip(coefficients, patterns, strict=True):
+            if X.nnz == 0:
+                values.append(None)
+                continue
+            places = csc_array(union.multiply(pattern))
+            places.sort_indices()
+            spread = np.zeros(union.nnz, dtype=X.dtype)
+            spread[places.data.astype(np.intp) - 1] = X.data
+            values.append(spread)
+        return cls(tuple(values), union.indices, union.indptr, None, None, is_ordered=False)
+
+    @property
+    def is_nearly_symmetric(self) -> bool:
+        """Whether most entries have a partner across the diagonal, which is full."""
+        n = self.indptr.size - 1
+        pattern = csc_array((np.ones(self.indices.size), self.indices, self.indptr), shape=(n, n))
+        partners = pattern.multiply(pattern.T).nnz
+        return bool(partners >= SYMMETRIC_SHARE * pattern.nnz)
+
+    def at(self, s: complex) -> SparseMatrix:
+        """Give P(s), its rows and columns in order."""
+        total = np.zeros(self.indices.size, dtype=np.complex128)
+        for power, part in enumerate(self.values):
+            if part is not None:
+                total += s**power * part
+        n = self.indptr.size - 1
+        return csc_array((total, self.indices, self.indptr), shape=(n, n))
+
+    def equilibrated_at(self, s: complex) -> tuple[SparseMatrix, FloatArray, FloatArray]:
+        """Give P(s) with the largest entries of its rows and columns near one, and the powers of two that do it."""
+        P = self.at(s)
+        by_row, _ = largest_by_row_and_column(P)
+        down = powers_of_two(by_row)
+        P.data *= down[P.indices]
+        _, by_column = largest_by_row_and_column(P)
+        across = powers_of_two(by_column)
+        P.data *= across[column_of_entries(P)]
+        return P, down, across
+
+    def in_order(self, rows: npt.NDArray[np.intp] | None, columns: npt.NDArray[np.intp]) -> "SparsePencil":
+        """Bring rows and columns into a new order."""
+        n = self.indptr.size - 1
+        place = csc_array((np.arange(1, self.indices.size + 1), self.indices, self.indptr), shape=(n, n))[:, columns]
+        if rows is not None:
+            place = csc_array(place.tocsr()[rows])
+        place = csc_array(place)
+        place.sort_indices()
+        values = tuple([None if part is None else part[place.data - 1] for part in self.values])
+        return SparsePencil(values, place.indices, place.indptr, rows, columns, is_ordered=True)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PointFactors:
+    """P(s), equilibrated by powers of two and factorized."""
+
+    lu: SuperLU
+    matrix: SparseMatrix  #: what was factorized
+    size: SparseMatrix  #: its absolute values
+    down: FloatArray  #: (n, 1) factors of its rows
+    across: FloatArray  #: (n, 1) factors of its columns
+    pencil: SparsePencil
+
+    @classmethod
+    def of(cls, pencil: SparsePencil, s: complex, ordering: Any, threshold: float) -> "PointFactors":  # noqa: ANN401  # Literal
+        """Factorize P(s).
+
+        Raises
+        ------
+        RuntimeError
+            It is exactly singular.
+        """
+        P, down, across = pencil.equilibrated_at(s)
+        symmetric = threshold < 1.0
+        lu = splu(P, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
+        return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
+
+    def solve(self, right: Matrix) -> tuple[ComplexArray, float]:
+        """Give ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
+        rows, columns = self.pencil.rows, self.pencil.columns
+        scaled: ComplexArray = np.asarray((right if rows is None else right[rows]) * self.down, dtype=np.complex128)
+        solution: Any = self.lu.solve(scaled)
+        residual, backward_error = self._residual(scaled, solution)
+        if backward_error > REFINED:
+            solution += self.lu.solve(residual)
+            _, backward_error = self._residual(scaled, solution)
+        solution *= self.across
+        if columns is None:
+            return solution, backward_error
+        back = np.empty_like(solution)
+        back[columns] = solution
+        return back, backward_error
+
+    def growth(self) -> float:
+        """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
+        right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
+        size = float(np.abs(self.lu.solve(right)).max())
+        return size if np.isfinite(size) else np.inf
+
+    def _residual(self, right: ComplexArray, solution: ComplexArray) -> tuple[ComplexArray, float]:
+        residual = right - times(self.matrix, solution)
+        size = times(self.size, np.abs(solution)) + np.abs(right)
+        worst = float((np.abs(residual) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+        return residual, worst if np.isfinite(worst) else np.inf
+
+
+def _polynomial(coefficients: Sequence[SparseMatrix], s: complex) -> SparseMatrix:
+    """Give the value of a matrix polynomial, skipping zero coefficients."""
+    value = csc_array(coefficients[0])
+    for power, part in enumerate(coefficients[1:], start=1):
+        if part.nnz:
+            value = value + s**power * part
+    return csc_array(value)

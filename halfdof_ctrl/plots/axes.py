@@ -1,0 +1,299 @@
+"""What the plots share: axes to draw on, a legend that covers no data, and labels with units.
+
+A signal's unit follows from the model: a DOF's displacement is in m, its derivatives in m/s and m/s^2, the
+force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.legend import Legend
+from matplotlib.lines import Line2D
+
+from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.names import (
+    MOST_CACHED,
+    force_names,
+    motion_names,
+    name_from_label,
+    physical_places,
+    reaction_names,
+    unknown_name_error,
+)
+
+AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
+AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
+Units: TypeAlias = Mapping[str, str] | None
+
+FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
+LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
+LEGEND_SIZE = 9.0  #: [pt]
+LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
+CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
+FORCE_UNITS = {"m": "N", "mm": "N", "rad": "N m", "m^3": "Pa"}  #: of the force on a DOF, by the DOF's unit
+
+
+def prepared_axes(
+    ax: AxesLike, shape: tuple[int, int], what: str, *, height: float, ratios: Iterable[float] | None = None
+) -> AxesArray:
+    """Give an array of axes of the wanted shape: the given ones, or those of a new figure.
+
+    Parameters
+    ----------
+    ax : Axes, array_like of Axes, or None
+        A single Axes where one is enough; one dimension where there is one row or one column.
+    shape : (int, int)
+        Rows and columns that the plot needs.
+    what : str
+        What stands in rows and columns, for the message.
+    height : float
+        Of a new figure [in].
+    ratios : iterable of float, optional
+        Heights of the rows of a new figure, relative to each other.
+
+    Raises
+    ------
+    ParameterError
+        Axes of another shape, or things that are no Axes.
+    """
+    rows, columns = shape
+    if ax is None:
+        # the figure comes first: what the first one switches on in a notebook, rc_context would switch off again
+        figure = plt.figure(figsize=(max(FIGURE_WIDTH, 3.0 * columns), height), layout="constrained")
+        heights = None if ratios is None else list(ratios)
+        with plt.rc_context(control.config.defaults["ctrlplot.rcParams"] if columns > 1 else {}):
+            return figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=heights)
+    given = np.asarray(ax, dtype=object)
+    if not all(isinstance(entry, Axes) for entry in given.flat):
+        msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."
+        raise ParameterError(msg, parameter="ax", value=ax)
+    if given.shape != shape and not (given.ndim < 2 and min(shape) == 1 and given.size == max(shape)):  # noqa: PLR2004
+        msg = (
+            f"ax has shape {given.shape}, but this plot needs axes of shape {shape}: {what}. "
+            f"Pass plt.subplots({rows}, {columns})[1], or leave ax out for a new figure."
+        )
+        raise ParameterError(msg, parameter="ax", value=given.shape)
+    return given.reshape(shape)
+
+
+def no_lines(axes: AxesArray) -> npt.NDArray[Any]:
+    """Give an empty list for each of the axes."""
+    lines = np.empty(axes.shape, dtype=object)
+    for place in np.ndindex(axes.shape):
+        lines[place] = []
+    return lines
+
+
+def finished_plot(
+    lines: npt.NDArray[Any],
+    axes: AxesArray,
+    title: str | None,
+    system: control.StateSpace | SecondOrderModel,
+    *,
+    own: bool,
+) -> control.ControlPlot:
+    """Add legend and title, and pack everything up.
+
+    `own` tells that the figure was made here: its title is by default the name of the system, if it has one.
+    """
+    legend = draw_legend(axes, own=own)
+    name = system.name or ""
+    made_up = name.startswith("sys[") and name.endswith("]")
+    if title is None and own and not made_up:
+        title = plain(name_from_label(name))
+    if title:
+        draw_title(axes, title, own=own)
+    return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)
+
+
+def require_system(sysdata: object) -> None:
+    """Refuse what is neither a state space nor a model.
+
+    Raises
+    ------
+    ParameterError
+        Anything else, such as a transfer function.
+    """
+    if not isinstance(sysdata, control.StateSpace | SecondOrderModel):
+        msg = (
+            f"sysdata must be a SecondOrderModel or a control.StateSpace, not {type(sysdata).__name__}. "
+            "Convert it first, by mechss or control.ss."
+        )
+        raise ParameterError(msg, parameter="sysdata", value=sysdata)
+
+
+def legend_prefix(label: str | None) -> str:
+    """Give what stands before the entries of a system in the legend."""
+    return f"{plain(label)}: " if label else ""
+
+
+def label_y(ax: Axes, text: str) -> None:
+    """Label the y axis, but keep a label that says the same and more (the unit, from a model drawn before)."""
+    if not ax.get_ylabel().startswith(text):
+        ax.set_ylabel(text)
+
+
+def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
+    """Draw light grid lines, or none."""
+    style: dict[str, Any] = {"color": "0.85", "linewidth": 0.7} if on else {}  # matplotlib draws what has a style
+    for ax in axes:
+        ax.grid(visible=on, which="major", **style)
+        ax.set_axisbelow(True)
+
+
+def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
+    """Put a legend where it covers no data: below a figure of our own, else above the first of the axes.
+
+    Lines with the same text and look stand in it once.
+    """
+    figure = axes[0, 0].figure
+    ours = [legend for legend in figure.legends if legend.get_gid() == LEGEND]
+    entries: dict[tuple[object, ...], Line2D] = {}
+    for line in [line for ax in axes.flat for line in ax.get_lines()]:
+        look = (line.get_label(), line.get_color(), line.get_linestyle(), line.get_marker())
+        if not str(line.get_label()).startswith("_"):
+            entries.setdefault(look, line)
+    if not entries:
+        return None
+    lines = list(entries.values())
+    longest = max(len(str(line.get_label())) for line in lines) + 8
+    for_figure = own or bool(ours)
+    width = figure.bbox.width / figure.dpi * (1.0 if for_figure else axes[0, 0].get_position().width)
+    rows = -(-len(lines) // int(np.clip(LEGEND_CHARACTERS * width // longest, 1, len(lines))))
+    style: dict[str, Any] = {
+        "handles": lines,
+        "ncols": -(-len(lines) // rows),
+        "fontsize": LEGEND_SIZE,
+        "frameon": False,
+    }
+    for old in ours:
+        old.remove()
+    if for_figure:
+        legend: Legend = figure.legend(loc="outside lower center", **style)
+        legend.set_gid(LEGEND)
+        return legend
+    first: Axes = axes[0, 0]
+    return first.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **style)
+
+
+def draw_title(axes: AxesArray, title: str, *, own: bool) -> None:
+    """Put a title above a figure of our own, or above the first of given axes."""
+    if own:
+        axes[0, 0].figure.suptitle(title, fontsize="medium")
+    else:
+        legend = axes[0, 0].get_legend()
+        axes[0, 0].set_title(title, fontsize="medium", pad=6.0 if legend is None else 14.0 * _legend_rows(legend) + 8.0)
+
+
+def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> dict[str, str]:
+    """Give the units of the signals that have one, by name.
+
+    Parameters
+    ----------
+    system : control.StateSpace or SecondOrderModel
+    units : mapping from name to unit, optional
+        For a DOF the unit of its displacement, from which those of its derivatives and its force follow;
+        for any other signal its own.
+
+    Raises
+    ------
+    SignalNameError
+        A unit for a signal that the system does not have.
+    """
+    given = dict(units or {})
+    known: dict[str, str | None] = {}
+    if isinstance(system, SecondOrderModel):
+        names: set[str] = {*system.inputs, *system.outputs}
+        dofs = tuple(dict.fromkeys((*system.dofs, *system.prescribed)))
+        if len(dofs) > MOST_CACHED:
+            dofs = _concerned({*names, *given}, dofs)
+        for dof, *motions, force in zip(
+            dofs, *(motion_names(dofs, k) for k in range(3)), force_names(dofs), strict=True
+        ):
+            unit = given.get(dof, "m")
+            known |= dict(zip(motions, (unit, f"{unit}/s", f"{unit}/s^2"), strict=True))
+            known[force] = FORCE_UNITS.get(unit)
+            if dof in system.prescribed:
+                known[reaction_names((dof,))[0]] = FORCE_UNITS.get(unit)
+    else:
+        names = {name for side in signal_names(system) for name in side}
+    for name in given:
+        if name not in names and name not in known:
+            raise unknown_name_error(name, "signal", sorted(names | set(known)))
+    return {name: unit for name, unit in (known | given).items() if unit}
+
+
+def _concerned(names: set[str], dofs: tuple[str, ...]) -> tuple[str, ...]:
+    """Give the DOFs that some of the names are forces on or motions of."""
+    places = {place % len(dofs) for place in physical_places(names, dofs, "output").values()}
+    return tuple([dofs[place] for place in sorted(places.union(physical_places(names, dofs, "input").values()))])
+
+
+def signal_names(system: control.StateSpace | SecondOrderModel) -> tuple[list[str], list[str]]:
+    """Give the names of the outputs and of the inputs, as the model has them."""
+    if isinstance(system, SecondOrderModel):
+        return list(system.outputs), list(system.inputs)
+    outputs, inputs = (
+        [name_from_label(label) for label in labels] for labels in (system.output_labels, system.input_labels)
+    )
+    return outputs, inputs
+
+
+def signal_label(name: str, units: Mapping[str, str]) -> str:
+    """Write a signal with its unit, as far as it is known.
+
+    >>> signal_label("y_ddot", {"y_ddot": "m/s^2"})
+    'y_ddot [m/s²]'
+    """
+    return plain(name) + (f" [{typeset(units[name])}]" if name in units else "")
+
+
+def ratio_label(output: str, source: str, units: Mapping[str, str], *, dB: bool, newline: bool) -> str:
+    """Write the magnitude of a transfer function with its unit.
+
+    >>> ratio_label("y_dot", "F_y", {"y_dot": "m/s", "F_y": "N"}, dB=False, newline=False)
+    '|y_dot/F_y| [(m/s)/N]'
+    """
+    unit = ratio_unit(output, source, units)
+    if dB:
+        unit = f"dB re 1 {unit}" if unit not in {"", "-"} else "dB"
+    return f"|{plain(output)}/{plain(source)}|" + (("\n" if newline else " ") + f"[{unit}]" if unit else "")
+
+
+def ratio_unit(output: str, source: str, units: Mapping[str, str]) -> str:
+    """Write the unit of a ratio of two signals, as far as it is known.
+
+    >>> ratio_unit("F_phi", "phi", {"F_phi": "N m", "phi": "rad"})
+    '(N m)/rad'
+    """
+    if output not in units or source not in units:
+        return ""
+    over, under = units[output], units[source]
+    over = f"({over})" if set(over) & set("/ ") else over
+    under = f"({under})" if set(under) & set("/ ") else under
+    return "-" if over == under else typeset(f"{over}/{under}")
+
+
+def plain(name: str) -> str:
+    """Write a name so that matplotlib does not read it as mathematics."""
+    return name.replace("$", r"\$")
+
+
+def typeset(unit: str) -> str:
+    """Write powers in a unit as superscripts.
+
+    >>> typeset("m/s^2")
+    'm/s²'
+    """
+    return unit.replace("^2", "²").replace("^3", "³")
+
+
+def _legend_rows(legend: Legend) -> int:
+    columns = max(1, int(getattr(legend, "_ncols", 1)))
+    return -(-len(legend.get_texts()) // columns)

@@ -1,0 +1,128 @@
+"""The s-plane behind a pole map: limits, logarithmic axes, and lines of equal damping and frequency.
+
+python-control draws its grid only on axes that it makes itself. Here a line of equal damping ratio zeta is
+s = r (-zeta + j sqrt(1 - zeta^2)) for all r, one of equal natural frequency s = r exp(j phi) for all phi, both drawn
+as points, so that they are right on logarithmic axes too.
+"""
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
+
+from halfdof_ctrl.base.arrays import FloatArray
+
+WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
+AT_ORIGIN = 1e-7  #: points below this part of the largest |s| do not decide on that
+DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
+APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
+SAME = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
+GREY = "0.78"
+BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
+TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
+CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
+
+
+def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete: bool) -> None:
+    """Set scales and limits that show all points, the origin (or unit circle), and some room."""
+    if discrete:
+        points = np.concatenate([points, [-1.0, 1.0, 1.0j, -1.0j]])
+    size = np.abs(points)
+    largest = float(size.max(initial=0.0)) or 1.0
+    smallest = float(size[size > AT_ORIGIN * largest].min(initial=largest))
+    left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
+    height = float(np.abs(points.imag).max(initial=0.0))
+    if largest > WIDE * smallest and not discrete:
+        linear = 10.0 ** np.floor(np.log10(smallest))
+        for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
+            set_scale("symlog", linthresh=linear)
+            locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
+            locator.set_params(numticks=9)
+            axis.set_major_locator(locator)
+        ax.set_xlim(min(8.0 * left, -10.0 * linear), max(8.0 * right, linear))
+        top = max(8.0 * height, 10.0 * linear)
+    else:
+        width = max(right - left, 0.1 * height) or 1.0
+        ax.set_xlim(min(left - 0.18 * width, -0.7 * width), right + 0.18 * width)
+        top = 1.2 * max(height, 0.35 * width)
+    ax.set_ylim(-top, top)
+
+
+def draw_pole_grid(ax: Axes) -> None:
+    """Draw and label lines of equal damping ratio and of equal natural frequency within the limits."""
+    reach = float(np.hypot(max(np.abs(ax.get_xlim())), max(np.abs(ax.get_ylim()))))
+    radii = np.geomspace(1e-12 * reach, reach, 900)
+    last = _axes_coordinates(ax, 1j * radii)[_inside(ax, 1j * radii)][-1]
+    for zeta in DAMPING_RATIOS:
+        ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
+        inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
+        end = inside[-1] if inside.size else last
+        if np.hypot(*(end - last)) < APART or np.hypot(*(end - (0.0, 0.5))) < APART:
+            continue
+        last = end
+        _draw_mirrored(ax, ray)
+        side = "left" if end[0] < 0.5 else "center"  # noqa: PLR2004
+        ax.text(end[0] + 0.005, end[1] - 0.008, f"ζ = {zeta:g}", transform=ax.transAxes, ha=side, va="top", **TEXT)
+    small = np.geomspace(1e-9, np.pi / 4.0, 150)
+    angles = np.concatenate([np.pi / 2.0 + small, np.pi - small[::-1]])
+    last = np.full(2, np.inf)
+    for radius in _natural_frequencies(ax, reach):
+        arc = radius * np.exp(1j * angles)
+        path = _axes_coordinates(ax, arc.conj())[_inside(ax, arc)]
+        length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
+        if length[-1] > APART:
+            _draw_mirrored(ax, arc)
+            middle = path[np.searchsorted(length, 0.5 * length[-1])]
+            if np.hypot(*(middle - last)) > APART and middle[0] > EDGE:
+                ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
+                last = middle
+
+
+def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
+    """Write the multiplicity beside points that coincide up to rounding."""
+    left, near_origin = points, AT_ORIGIN * np.abs(points).max(initial=0.0)
+    while left.size:
+        same = np.abs(left - left[0]) <= SAME * np.abs(left[0]) + near_origin
+        if np.count_nonzero(same) > 1:
+            ax.annotate(
+                f"{np.count_nonzero(same)}x",
+                (float(left[0].real), float(left[0].imag)),
+                xytext=(6, 6),
+                textcoords="offset points",
+                fontsize="small",
+                color=colour,
+            )
+        left = left[~same]
+
+
+def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:
+    """Choose round radii: decades on logarithmic axes, else equal steps."""
+    if ax.get_xscale() == "symlog":
+        linear = ax.xaxis.get_transform().linthresh  # type: ignore[attr-defined]
+        return 10.0 ** np.arange(np.ceil(np.log10(linear)), np.log10(reach), 1.0)
+    ticks = np.asarray(MaxNLocator(5).tick_values(0.0, reach))
+    return ticks[ticks > 0.0]
+
+
+def _number(value: float) -> str:
+    """Write a number, from 10^4 as a power of ten."""
+    exponent = round(np.log10(value))
+    return f"{value:g}" if -4 < exponent < 4 else rf"$10^{{{exponent}}}$"  # noqa: PLR2004
+
+
+def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:
+    for half in (points, points.conj()):
+        ax.plot(half.real, half.imag, color=GREY, linewidth=0.7, zorder=0.6, label="_grid", scalex=False, scaley=False)
+
+
+def _axes_coordinates(ax: Axes, points: npt.NDArray[np.complexfloating]) -> FloatArray:
+    """Give where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
+    return np.asarray((ax.transScale + ax.transLimits).transform(np.column_stack([points.real, points.imag])))
+
+
+def _inside(ax: Axes, points: npt.NDArray[np.complexfloating]) -> npt.NDArray[np.bool_]:
+    places = _axes_coordinates(ax, points)
+    return np.asarray(((places >= 0.0) & (places <= 1.0)).all(axis=1))

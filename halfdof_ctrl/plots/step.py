@@ -1,0 +1,179 @@
+"""The step response: outputs of the state space, and the DOFs without inertia recovered from its states."""
+
+from itertools import product
+from typing import Any
+
+import control
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.plots.axes import (
+    AxesArray,
+    AxesLike,
+    Units,
+    draw_grid,
+    finished_plot,
+    known_units,
+    label_y,
+    legend_prefix,
+    no_lines,
+    plain,
+    prepared_axes,
+    require_system,
+    signal_label,
+    signal_names,
+    typeset,
+)
+from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.systems.step_times import relevant_poles, step_times
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.systems.state_space import mech2ss
+
+NAMED_LINES = 8  #: recovered DOFs that the legend names
+MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn
+EVEN = 1e-6  #: relative differences between time steps that are rounding
+
+
+def step_plot(
+    sysdata: control.StateSpace | SecondOrderModel,
+    timepts: npt.ArrayLike | None = None,
+    *,
+    ax: AxesLike = None,
+    grid: bool = True,
+    title: str | None = None,
+    label: str | None = None,
+    units: Units = None,
+) -> control.ControlPlot:
+    """Draw the response to a unit step of each input, for a model with the DOFs that have no inertia.
+
+    Parameters
+    ----------
+    sysdata : control.StateSpace or SecondOrderModel
+        The outputs are `control.step_response` of the state space, for a model of `mech2ss` of it. Below them
+        stand the displacements of its half and static DOFs, as `ExactReduction.recover` gives them (with
+        orthonormal bases, of every DOF that a half or static coordinate moves); not those of a sparse model with more
+        than 200 DOFs.
+    timepts : (k,) array_like or float, optional
+        Equidistant times [s], or the last time. By default `step_times` of the modes that are seen in the
+        plot; python-control's own choice for a discrete-time system.
+    ax : (rows, m) array_like of Axes, optional
+        p outputs in rows, and a row for the recovered displacements of each unit, if there are any; m inputs
+        in columns.
+    grid : bool
+        Draw grid lines.
+    title, label, units : optional
+        As in `bode_plot`.
+
+    Returns
+    -------
+    control.ControlPlot
+        ``lines`` has the shape of the axes.
+
+    Raises
+    ------
+    ParameterError
+        Axes of the wrong shape, times that are not equidistant, something that is neither system nor model.
+    SignalNameError
+        A unit for an unknown signal.
+    ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
+        The model has no state space (see `mech2ss`).
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> cplt = step_plot(hydromount().select(inputs="F_y", outputs="y"))
+    >>> [ax.get_ylabel() for ax in cplt.axes[:, 0]]
+    ['y [m]', 'displacement [m]']
+    >>> plt.close(cplt.figure)
+    """
+    require_system(sysdata)
+    known = known_units(sysdata, units)
+    reduction = exact_reduction(sysdata) if isinstance(sysdata, SecondOrderModel) else None
+    sys: Any = sysdata if reduction is None else mech2ss(reduction)
+    if reduction is not None and reduction.model.is_sparse and len(reduction.model.dofs) > MOST_RECOVERED:
+        reduction = None  # nobody could tell so many curves apart
+    response = control.step_response(sys, _times(sys, reduction, timepts), squeeze=False)
+    time, outputs = np.asarray(response.time), np.asarray(response.outputs)
+    (p, m), panels = outputs.shape[:2], _panels(reduction, known)
+    what = f"{p} outputs and {len(panels)} groups of recovered displacements in rows, {m} inputs in columns"
+    axes = prepared_axes(ax, (p + len(panels), m), what, height=1.2 + 1.6 * max(2, p + len(panels)))
+    lines, prefix = no_lines(axes), legend_prefix(label)
+    style: dict[str, Any] = {"drawstyle": "steps-post" if sys.isdtime(strict=True) else "default", "linewidth": 1.5}
+    for i, j in product(range(p), range(m)):
+        lines[i, j] += axes[i, j].plot(
+            time, outputs[i, j], label=f"{prefix}outputs" if panels or prefix else "_outputs", **style
+        )
+    if reduction is not None and panels:
+        motion, kinds = reduction.recover(response), reduction.partition.kinds_of(reduction.model.dofs)
+        for (row, (unit, dofs)), j in product(enumerate(panels.items(), start=p), range(m)):
+            histories = [motion[dof][j] for dof in dofs]
+            lines[row, j] += _draw_recovered(axes[row, j], time, histories, {d: kinds[d] for d in dofs}, prefix)
+            axes[row, j].set_ylabel((plain(dofs[0]) if len(dofs) == 1 else "displacement") + unit)
+    _dress(axes, sys, known, grid=grid)
+    return finished_plot(lines, axes, title, sysdata, own=ax is None)
+
+
+def _times(
+    sys: control.StateSpace, reduction: ExactReduction | None, timepts: npt.ArrayLike | None
+) -> FloatArray | float | None:
+    """Check the given times, or choose them from the modes seen in the outputs and the recovered DOFs."""
+    if timepts is not None and np.ndim(timepts) > 0:
+        given = np.asarray(timepts, dtype=float)
+        steps = np.diff(given) if given.ndim == 1 else np.zeros(0)
+        if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN * steps[0]).all():
+            msg = (
+                "timepts must be rising, equidistant times [s], at least two, since python-control simulates on no "
+                "others: take numpy.linspace, or give the last time alone."
+            )
+            raise ParameterError(msg, parameter="timepts", value=timepts)
+        return given
+    horizon = None if timepts is None else float(np.asarray(timepts))
+    if sys.isdtime(strict=True):
+        return horizon
+    C, D = np.asarray(sys.C), np.asarray(sys.D)
+    if reduction is not None:
+        motion = reduction.displacement
+        C, D = np.vstack([C, motion.X]), np.vstack([D, motion.direct(sys.ninputs)])
+    return step_times(relevant_poles(sys.A, sys.B, C, D), horizon)
+
+
+def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:
+    """Group the DOFs that are recovered by the unit they are drawn in."""
+    groups: dict[str, list[str]] = {}
+    for dof in [] if reduction is None else reduction.partition.kinds_of(reduction.model.dofs):
+        groups.setdefault(f" [{typeset(units[dof])}]" if dof in units else "", []).append(dof)
+    return groups
+
+
+def _draw_recovered(
+    ax: Axes, time: FloatArray, histories: list[FloatArray], kinds: dict[str, str], prefix: str
+) -> list[Line2D]:
+    """Draw displacements, of which the legend names the first eight."""
+    lines: list[Line2D] = []
+    for k, ((dof, kind), history) in enumerate(zip(kinds.items(), histories, strict=True)):
+        text = f"{prefix}{plain(dof)} ({kind} DOF)"
+        if len(kinds) > NAMED_LINES and k >= NAMED_LINES - 1:
+            text = f"{prefix}{len(kinds) - k} more" if k == NAMED_LINES - 1 else "_more"
+        colour, dashes = f"C{1 + k % 9}", ("-", "--", "-.", ":")[k % 4]
+        lines += ax.plot(time, history, color=colour, linestyle=dashes, linewidth=1.5, label=text)
+    return lines
+
+
+def _dress(axes: AxesArray, sys: control.StateSpace, units: dict[str, str], *, grid: bool) -> None:
+    """Set labels and grid of all axes."""
+    for i, name in enumerate(signal_names(sys)[0]):
+        for ax in axes[i]:
+            label_y(ax, signal_label(name, units))
+    for j, name in enumerate(signal_names(sys)[1]):
+        step = f"{plain(name)} = 1 {typeset(units[name])}" if name in units else f"{plain(name)} = 1"
+        axes[-1, j].set_xlabel(f"time after the step {step} {'[samples]' if sys.dt is True else '[s]'}")
+    for ax in axes.flat:
+        ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
+        ax.yaxis.get_offset_text().set_fontsize("small")
+        ax.margins(x=0.0)
+    draw_grid(list(axes.flat), on=grid)
+    axes[0, 0].figure.align_ylabels(list(axes.flat))

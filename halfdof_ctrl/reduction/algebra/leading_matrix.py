@@ -1,0 +1,129 @@
+"""The leading matrix W of equation (2), factorized once."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.reduction.algebra.scaling import evening_logs
+
+SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
+FEWEST = 256  #: n in that bound at least
+PLAINLY_REGULAR = (
+    1e-5  #: W with this reciprocal condition number as it stands is not scaled, nor its state space compared ...
+)
+PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
+SMALL = 60  #: DOFs that are few
+MOST_STEPS = 16  #: of the iteration for the best scaling
+LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
+GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class LeadingMatrix:
+    """W of equation (2), factorized; scaled by powers of two where its condition asks for it.
+
+    How well W is conditioned must not depend on the units of DOFs, equations and time, so what counts is the least
+    condition number that scaled rows and columns can have. It is the spectral radius of ``|W^-1| |W|`` (F. L. Bauer,
+    Optimally scaled matrices, 1963), and says how near a singular matrix is: as long as no entry of W changes by more
+    than this part of itself, W stays regular.
+    """
+
+    factors: FloatArray  #: (n, n) L and U
+    pivots: npt.NDArray[np.int32]
+    rows: FloatArray | None  #: (n,) powers of two, None where W was taken as it is
+    columns: FloatArray | None  #: (n,) likewise
+    equilibrated: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
+    rcond: float  #: reciprocal 1-norm condition number of the matrix that was factorized; 0 if exactly singular
+
+    @classmethod
+    def factorized(cls, W: FloatArray) -> "LeadingMatrix":
+        """Factorize and estimate the condition; scale first where that might matter.
+
+        A W that is well conditioned as it stands is so in the best units too. Otherwise it is scaled by the means
+        of the logarithms of its entries, which gives the same matrix whatever the units were, and by the best
+        scaling after that if its condition still asks for it. So `rcond` is the same in any units up to what powers
+        of two and the estimate leave, a factor of about four, or large enough in all of them.
+        """
+        enough = PLAINLY_REGULAR_IF_SMALL if len(W) <= SMALL else PLAINLY_REGULAR
+        factors, pivots, rcond = _lu_and_rcond(W)
+        if rcond >= enough:
+            return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
+        rows, columns = [np.exp2(np.round(logs)) for logs in evening_logs(W)]
+        leading = cls._scaled(W, rows, columns)
+        if leading.rcond == 0.0 or leading.rcond >= enough:
+            return leading
+        better = cls._scaled(W, *leading.best_scaling())
+        return better if better.rcond > leading.rcond else leading
+
+    @classmethod
+    def _scaled(cls, W: FloatArray, rows: FloatArray, columns: FloatArray) -> "LeadingMatrix":
+        matrix = W * rows[:, None] * columns
+        factors, pivots, rcond = _lu_and_rcond(matrix)
+        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
+
+    def best_scaling(self) -> tuple[FloatArray, FloatArray]:
+        """Give powers of two near the row and column factors with which W has its least 1-norm condition number.
+
+        The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
+        any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
+        """
+        if self.equilibrated is None or self.rows is None or self.columns is None:
+            return np.ones(len(self.factors)), np.ones(len(self.factors))
+        size, inverse = np.abs(self.equilibrated), np.abs(dgetri(self.factors, self.pivots)[0])
+        u, least = np.ones(len(size)), np.inf
+        best = u, u
+        for _ in range(MOST_STEPS):
+            across = u @ size
+            following = across @ inverse
+            largest = float((following / u).max())
+            if not largest < GAIN * least:
+                break
+            best, least = (u, 1.0 / across), largest
+            u = np.maximum(following / following.max(), LEAST_FACTOR)
+        rows, columns = [np.exp2(np.round(np.log2(factors))) for factors in best]
+        return self.rows * rows, self.columns * columns
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether W is singular to working precision: rcond below n eps, or 256 eps.
+
+        Columns of W that combine DOFs are rounded themselves, which even a small W may show.
+        """
+        return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
+
+    def singular_values(self) -> FloatArray:
+        """Give the singular values of the matrix that was factorized."""
+        L, U = np.tril(self.factors, -1) + np.eye(len(self.factors)), np.triu(self.factors)
+        return np.asarray(scipy.linalg.svdvals(L @ U))
+
+    def elimination_size(self) -> FloatArray:
+        """Give ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
+        L, U = np.tril(np.abs(self.factors), -1) + np.eye(len(self.factors)), np.triu(np.abs(self.factors))
+        order = np.arange(len(self.factors))
+        for i, j in enumerate(self.pivots.tolist()):
+            order[[i, j]] = order[[j, i]]
+        size = np.empty_like(L)
+        size[order] = L @ U
+        if self.rows is not None and self.columns is not None:
+            size = size / self.rows[:, None] / self.columns
+        return size
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
+        if self.rows is None or self.columns is None or self.equilibrated is None:
+            return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
+        right = right * self.rows[:, None]
+        solution = dgetrs(self.factors, self.pivots, right)[0]
+        solution += dgetrs(self.factors, self.pivots, right - self.equilibrated @ solution)[0]
+        return np.asarray(solution * self.columns[:, None])
+
+
+def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
+    """Factorize and estimate the reciprocal 1-norm condition number, 0 where a pivot vanishes."""
+    norm = dlange("1", matrix)  # type: ignore[call-arg]  # the stubs lack its first argument
+    factors, pivots, exact_zero = dgetrf(matrix)
+    return factors, pivots, 0.0 if exact_zero else float(dgecon(factors, norm)[0])

@@ -1,0 +1,221 @@
+"""Equilibration by powers of two, for the reduction's rank decisions and factorizations.
+
+A unit changes a row or a column of a matrix by a factor. Decisions are therefore taken on the scaled
+matrix ``diag(r) X diag(c)``, whose largest entry in every nonzero row and column is near one; r and c
+are powers of two, which round nothing, so the scaling is undone exactly. (D. Ruiz, A scaling algorithm to
+equilibrate both rows and columns norms in matrices, 2001.)
+"""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array, csc_array, csr_array
+
+from halfdof_ctrl.base.arrays import FloatArray, Matrix
+
+IndexArray: TypeAlias = npt.NDArray[np.intp]
+
+MOST_PASSES = 12  #: each pass halves the spread's exponent; 12 take it from 2^2000 to below 2
+EVEN = 2.0**10  #: rows and columns whose largest entries are between 1/1024 and 1024 are left as they are
+FLAT = 1e-12  #: of the largest singular value: directions in which the least squares leave the factors open
+MOST_STEPS = 2000  #: of conjugate gradients for the logarithmic factors of one matrix
+SETTLED = 1e-20  #: of the first residual, squared, at which they stop
+SMALL = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
+
+
+def equilibrating_factors(matrix: FloatArray, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
+    """Give powers of two r, c such that ``diag(r) matrix diag(c)`` has row and column maxima near one.
+
+    Parameters
+    ----------
+    matrix : (k, l) ndarray
+        Any real matrix; zero rows and columns are left alone.
+    even : float, optional
+        Maxima between 1 / even and even are near enough to one.
+
+    Returns
+    -------
+    (k,) and (l,) ndarrays
+        Factors, all one where the maxima are near enough to one already.
+
+    Examples
+    --------
+    >>> equilibrating_factors(np.array([[65536.0, 0.0], [0.0, 0.5]]))
+    (array([0.00195312, 1.        ]), array([0.00195312, 1.        ]))
+    """
+    size = np.abs(matrix)
+    rows, columns = np.ones(size.shape[0]), np.ones(size.shape[1])
+    for _ in range(MOST_PASSES):
+        by_row, by_column = np.maximum.reduce(size, axis=1, initial=0.0), np.maximum.reduce(size, axis=0, initial=0.0)
+        if _is_even(by_row, even) and _is_even(by_column, even):
+            break
+        down, across = inverse_roots(by_row), inverse_roots(by_column)
+        rows *= down
+        columns *= across
+        size *= down[:, None]
+        size *= across
+    return rows, columns
+
+
+def _is_even(maxima: FloatArray, even: float) -> bool:
+    """Tell whether all nonzero maxima lie between 1 / even and even."""
+    return all([1.0 / even <= value <= even or value == 0.0 for value in maxima.tolist()])  # noqa: C419  # faster
+
+
+def inverse_roots(maxima: FloatArray) -> FloatArray:
+    """Give the powers of two nearest to one over the square root, 1 for a zero."""
+    exponents = np.frexp(maxima)[1]
+    return np.asarray(np.ldexp(1.0, -((exponents + np.sign(exponents)) // 2)))
+
+
+def logarithmic_scaling(coefficients: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Give the logarithms of the row, column and time factors that bring all coefficients nearest to one.
+
+    Least squares of ``log2 |P_k,ij| + r_i + c_j + k t`` over all nonzero coefficients (A. R. Curtis and J. K. Reid,
+    On the automatic scaling of matrices for Gaussian elimination, 1972, with time as one more unknown). The scaled
+    coefficients are the residuals, which are unique, so they are the same whatever the units were.
+
+    Parameters
+    ----------
+    coefficients : (k, n, n) ndarray
+        Of ``s^0, s^1, ...``.
+
+    Returns
+    -------
+    (n,) ndarray, (n,) ndarray, float
+        r, c and t.
+    """
+    present = coefficients != 0.0
+    power, i, j = np.nonzero(present)
+    n = coefficients.shape[1]
+    logs = np.log2(np.abs(coefficients[present]))
+    count = present.sum(axis=0).astype(float)
+    powers = np.einsum("kij,k->ij", present, np.arange(len(coefficients), dtype=float))
+    time = np.concatenate([powers.sum(axis=1), powers.sum(axis=0)])
+    square = np.block([[np.diag(count.sum(axis=1)), count], [count.T, np.diag(count.sum(axis=0))]])
+    normal = np.block([[square, time[:, None]], [time[None, :], np.array([[float((power**2).sum())]])]])
+    right = -np.concatenate([np.bincount(i, logs, n), np.bincount(j, logs, n), [float(power @ logs)]])
+    solution = np.linalg.lstsq(normal, right, rcond=FLAT)[0]
+    return solution[:n], solution[n : 2 * n], float(solution[-1])
+
+
+def evening_logs(matrix: Matrix | csc_array, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
+    """Give the logarithms of the row and column factors that bring all entries of one matrix nearest to one.
+
+    As `logarithmic_scaling` without time, and quicker for large matrices.
+
+    Parameters
+    ----------
+    matrix : (k, l) ndarray or csc_array
+        Any real matrix; zero rows and columns have the logarithm zero.
+    settled : float, optional
+        Accuracy, by default nearly full: squared residual over the first one.
+
+    Returns
+    -------
+    (k,) and (l,) ndarrays
+        To the base of two. Entries times both factors are unique, and so the same whatever the units were.
+
+    Examples
+    --------
+    >>> evening_logs(np.array([[8.0, 0.0], [8.0, 1.0]]))
+    (array([-2., -2.]), array([-1.,  2.]))
+    """
+    i, j, size = _entries(matrix)
+    return _evening(i, j, np.log2(size), matrix.shape, settled)
+
+
+def unit_free_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give row and column factors that make all entries of a matrix even, and then the largest ones near one.
+
+    The scaled matrix is the same whatever the units were.
+    """
+    rows, columns = [np.exp2(logs) for logs in evening_logs(matrix)]
+    down, across = levelling_factors(matrix * rows[:, None] * columns)
+    return rows * down, columns * across
+
+
+def time_log(coefficients: Sequence[Matrix | csc_array], settled: float = SETTLED) -> float:
+    """Give the logarithm of the time factor of `logarithmic_scaling`, for dense or sparse coefficients.
+
+    Examples
+    --------
+    A mass of 1/16 on a spring and a damper of one, alone: ``t = 2`` makes the least of 0, t and 2 t - 4:
+
+    >>> round(time_log([np.eye(1), np.eye(1), np.eye(1) / 16.0]), 9)
+    2.0
+    """
+    parts = [_entries(matrix) for matrix in coefficients]
+    i, j, size = (np.concatenate(values) for values in zip(*parts, strict=True))
+    logs, powers = np.log2(size), np.repeat(np.arange(float(len(parts))), [part[0].size for part in parts])
+    uneven = []
+    for values in (logs, powers):
+        rows, columns = _evening(i, j, values, coefficients[0].shape, settled)
+        uneven.append(values + rows[i] + columns[j])
+    square = float(uneven[1] @ uneven[1])
+    return -float(uneven[0] @ uneven[1]) / square if square > FLAT * powers.size else 0.0
+
+
+def _evening(
+    i: IndexArray, j: IndexArray, logs: FloatArray, shape: tuple[int, int], settled: float
+) -> tuple[FloatArray, FloatArray]:
+    """Minimize the squares of ``logs + r_i + c_j`` by conjugate gradients on c (Curtis and Reid, 1972)."""
+    pattern = csr_array((np.ones(i.size), (i, j)), shape=shape)
+    times = np.asarray(pattern.toarray()) if max(shape) <= SMALL else pattern
+    back = times.T
+    in_row, in_column = (np.maximum(np.bincount(k, minlength=n), 1) for k, n in zip((i, j), shape, strict=True))
+    by_row = -np.bincount(i, logs, shape[0])
+    columns = np.zeros(shape[1])
+    residual = -np.bincount(j, logs, shape[1]) - back @ (by_row / in_row)
+    step = residual / in_column
+    first = left = float(residual @ step)
+    for _ in range(MOST_STEPS):
+        if left <= max(settled * first, SETTLED):
+            break
+        moved = in_column * step - back @ ((times @ step) / in_row)
+        length = left / float(step @ moved)
+        columns += length * step
+        residual -= length * moved
+        eased = residual / in_column
+        before, left = left, float(residual @ eased)
+        step = eased + left / before * step
+    return (by_row - times @ columns) / in_row, columns
+
+
+def _entries(matrix: Matrix | csc_array) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Give the rows, columns and sizes of the nonzero entries."""
+    entries = coo_array(matrix)
+    present = np.flatnonzero(entries.data)
+    i, j = entries.coords
+    return i[present].astype(np.intp), j[present].astype(np.intp), np.abs(entries.data[present])
+
+
+def levelling_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Give r, c such that the largest entries of the rows and columns of ``diag(r) matrix diag(c)`` are near one.
+
+    Like `equilibrating_factors`, but not rounded to powers of two: for decisions that must come out the same in any
+    units, on a matrix that `logarithmic_scaling` has brought to the same values in any units.
+    """
+    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    for _ in range(MOST_PASSES):
+        size = np.abs(matrix) * rows[:, None] * columns
+        rows = rows / root_or_one(size.max(axis=1, initial=0.0))
+        columns = columns / root_or_one(size.max(axis=0, initial=0.0))
+    return rows, columns
+
+
+def root_or_one(maxima: FloatArray) -> FloatArray:
+    """Give the square roots, 1 for a zero."""
+    return np.sqrt(np.where(maxima > 0.0, maxima, 1.0))
+
+
+def gap_threshold(values: FloatArray, low: float, high: float) -> float:
+    """Give the middle of the widest gap between values from `low` to `high`; `low` itself if none lies there."""
+    inside = np.sort(values[(values > low) & (values < high)])
+    if inside.size == 0:
+        return low
+    edges = np.concatenate([[low], inside, [high]])
+    widest = int(np.argmax(edges[1:] / edges[:-1]))
+    return float(np.sqrt(edges[widest] * edges[widest + 1]))

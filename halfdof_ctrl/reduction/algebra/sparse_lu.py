@@ -1,0 +1,214 @@
+"""One sparse factorization of a real matrix, for solutions with the matrix and with its transpose.
+
+The matrix is equilibrated by powers of two. Where its pattern is nearly symmetric, SuperLU (X. S. Li, 2005) orders it
+by minimum degree of ``W + W^T`` and takes its pivots from the diagonal, which leaves the fewest entries in the
+factors; that is as stable as elimination without pivoting is for the matrix at hand, for a stiffness very. What a test
+solution loses tells: where it is more than rounding, solutions are corrected once, and where it is much, pivots
+are chosen more strictly, in the end by columns with partial pivoting. They are corrected too where W is so ill
+conditioned, as that of a slender structure is, that digits of the result are at stake: the residual is summed in
+extended precision, which brings back what the condition takes (N. J. Higham, 2002, chapter 12).
+
+What is factorized is the transpose, because the reduction solves with it, and SuperLU works many right-hand sides
+side by side for the matrix that it was given, but not for the transpose of that. Its small dense blocks gain nothing
+from several threads and may lose all by waiting for them: call it within ``threads.limited_threads(1)``.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csc_array, diags_array
+from scipy.sparse.linalg import LinearOperator, onenormest, splu
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
+from halfdof_ctrl.base.sparse_arrays import (
+    SparseMatrix,
+    column_of_entries,
+    exact_residual,
+    largest_by_row_and_column,
+    times,
+)
+
+PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
+WIDTH = 8  #: right-hand sides worked at a time
+REFINED = 2.0**-46  #: componentwise backward error of the test solution above which solutions are corrected once
+ILL_CONDITIONED = 2.0**-24  #: reciprocal condition number below which solutions are corrected once
+UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
+SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
+SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
+SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
+NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
+NULL_STEPS = 3  #: of inverse iteration for a null vector
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SparseLU:
+    """A real n x n matrix W, equilibrated and factorized.
+
+    Solutions are those of ``diag(rows) W``: who scales the equations by `rows` need not scale them back.
+    """
+
+    scaled: SparseMatrix  #: diag(rows) W diag(columns)
+    rows: FloatArray  #: (n,) powers of two
+    columns: FloatArray  #: (n,) likewise
+    factors: Any  #: SuperLU of the transpose of `scaled`; None where a pivot vanished
+    corrected: bool  #: whether solutions are corrected once
+    rcond: float  #: reciprocal 1-norm condition number of `scaled`, estimated; 0 if a pivot vanished
+
+    @classmethod
+    def factorized(cls, matrix: SparseMatrix) -> "SparseLU":
+        """Equilibrate, factorize and estimate the condition.
+
+        Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
+        logarithms of its entries, which does not depend on units, and judged again.
+        """
+        first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
+        if not first.is_singular:
+            return first
+        second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
+        return second if second.rcond > first.rcond else first
+
+    @classmethod
+    def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
+        scaled = scaled_matrix(matrix, rows, columns)
+        factors, corrected = _factorized(csc_array(scaled.T))
+        rcond = 0.0 if factors is None else _reciprocal_condition(scaled, factors)
+        corrected = corrected or 0.0 < rcond < ILL_CONDITIONED
+        return cls(scaled=scaled, rows=rows, columns=columns, factors=factors, corrected=corrected, rcond=rcond)
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether W is singular to working precision."""
+        return self.rcond < min(self.rows.size * float(np.finfo(float).eps), SINGULAR)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Give ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
+        solution = self._solved(right, "T")
+        solution *= self.columns[:, None]
+        return solution
+
+    def solve_transposed(self, right: FloatArray) -> FloatArray:
+        """Give ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
+
+        Where solutions are corrected, in extended precision: products in which terms cancel keep their digits.
+        """
+        right *= self.columns[:, None]
+        return self._solved(right, "N")
+
+    def column_sizes(self, solution: FloatArray) -> FloatArray:
+        """Give the largest entry of each column of what `solve` gave, in the units in which W is even."""
+        return largest_of_columns(solution / self.columns[:, None])
+
+    def null_vector(self) -> FloatArray:
+        """Give a vector that the scaled matrix, if it is singular, makes zero, its largest entry one.
+
+        By inverse iteration on the matrix with a diagonal of some 1e-12 added, which is singular in no case.
+        """
+        generator = np.random.default_rng(0)
+        nudge = diags_array(NUDGE * generator.uniform(1.0, 2.0, self.rows.size))
+        factors = _attempt(csc_array(self.scaled.T + nudge), *PIVOTINGS[-1])
+        vector = generator.standard_normal(self.rows.size)
+        for _ in range(NULL_STEPS):
+            vector = factors.solve(vector)
+            vector = factors.solve(vector / np.abs(vector).max(), trans="T")
+            vector = vector / np.abs(vector).max()
+        return np.asarray(vector)
+
+    def _solved(self, right: FloatArray, transposed: str) -> FloatArray:
+        solution = self.factors.solve(right, trans=transposed)
+        if not self.corrected:
+            return np.asarray(solution)
+        rest = exact_residual(self.scaled, right, solution, transposed=transposed == "N")
+        correction = self.factors.solve(rest, trans=transposed)
+        return np.asarray(solution + correction.astype(np.longdouble if transposed == "N" else float))
+
+
+def largest_of_columns(matrix: FloatArray) -> FloatArray:
+    """Give the size of the largest entry of each column."""
+    return np.asarray(np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0)))
+
+
+def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
+    """Give powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
+
+    Examples
+    --------
+    >>> sparse_equilibrating_factors(csc_array([[65536.0, 0.0], [0.0, 0.5]]))
+    (array([0.00195312, 1.        ]), array([0.00195312, 1.        ]))
+    """
+    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    column = column_of_entries(size)
+    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    for _ in range(MOST_PASSES):
+        by_row, by_column = largest_by_row_and_column(size)
+        maxima = np.concatenate([by_row[by_row > 0.0], by_column[by_column > 0.0]])
+        if maxima.size == 0 or (maxima.min() >= 1.0 / even and maxima.max() <= even):
+            break
+        down, across = inverse_roots(by_row), inverse_roots(by_column)
+        rows *= down
+        columns *= across
+        size.data *= down[size.indices]
+        size.data *= across[column]
+    return rows, columns
+
+
+def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
+    """Give factors as `scaling.levelling_factors` does, for a sparse matrix."""
+    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    column = column_of_entries(size)
+    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
+    for _ in range(MOST_PASSES):
+        down, across = [1.0 / root_or_one(maxima) for maxima in largest_by_row_and_column(size)]
+        rows *= down
+        columns *= across
+        size.data *= down[size.indices]
+        size.data *= across[column]
+    return rows, columns
+
+
+def scaled_matrix(matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> SparseMatrix:
+    """Give ``diag(rows) matrix diag(columns)``."""
+    data = matrix.data * rows[matrix.indices] * columns[column_of_entries(matrix)]
+    return csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
+
+
+def is_nearly_symmetric(matrix: SparseMatrix) -> bool:
+    """Tell whether most entries have a partner across the diagonal."""
+    pattern = csc_array((np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
+    return bool(pattern.multiply(pattern.T).nnz >= SYMMETRIC_SHARE * pattern.nnz)
+
+
+def _factorized(matrix: SparseMatrix) -> tuple[Any, bool]:
+    """Factorize in the first way whose test solution is good, and tell whether solutions need a correction."""
+    test = np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0])
+    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
+    for ordering, threshold in PIVOTINGS if is_nearly_symmetric(matrix) else PIVOTINGS[-1:]:
+        try:
+            factors = _attempt(matrix, ordering, threshold)
+        except RuntimeError:  # a column vanishes
+            return None, False
+        solution = factors.solve(test)
+        bound = times(size, np.abs(solution)) + test
+        error = float((np.abs(test - times(matrix, solution)) / bound).max())
+        if error <= UNSAFE:
+            return factors, error > REFINED
+    return factors, True
+
+
+def _attempt(matrix: SparseMatrix, ordering: Any, threshold: float) -> Any:  # noqa: ANN401  # SuperLU has no public type
+    symmetric = threshold < 1.0
+    return splu(matrix, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
+
+
+def _reciprocal_condition(scaled: SparseMatrix, factors: Any) -> float:  # noqa: ANN401  # SuperLU has no public type
+    """Estimate the reciprocal 1-norm condition number (N. J. Higham and F. Tisseur, 2000)."""
+    inverse = LinearOperator(
+        scaled.shape,
+        matvec=lambda vector: factors.solve(vector.ravel(), trans="T"),
+        rmatvec=lambda vector: factors.solve(vector.ravel()),
+        dtype=np.float64,
+    )
+    with np.errstate(all="ignore"):
+        largest = float(abs(scaled).sum(axis=0).max()) * float(onenormest(inverse, t=1))
+    return 1.0 / largest if np.isfinite(largest) and largest > 0.0 else 0.0

@@ -1,0 +1,176 @@
+"""Equations ``P(s) q = B(s) u`` as rows of coefficients, their scaling, and the row operation (17).
+
+    row_h <- row_h - sum_i x_i s^(c_i - c_h) row_i                                         (17)
+
+Each coefficient carries the mean square of its rounding error; what lies within it is zero.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
+from halfdof_ctrl.reduction.deflation.offsets import BoolArray, IndexArray, Offsets
+from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors, logarithmic_scaling
+
+EPS = float(np.finfo(float).eps)
+DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
+
+
+@dataclass(frozen=True, slots=True)
+class Caution:
+    """How many mean rounding errors count as nothing: for single coefficients and for singular values."""
+
+    entry: float
+    rank: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Elimination:
+    """Equation (16) for one row."""
+
+    row: int
+    columns: IndexArray  #: where its tight coefficients vanish
+    sources: IndexArray
+    multipliers: FloatArray  #: x_i
+    errors: FloatArray  #: root mean square errors of x_i
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class RowSystem:
+    """``P(s) q = B(s) u`` in scaled units: n equations and unknowns, m inputs, powers of s up to k - 1."""
+
+    coefficients: FloatArray  #: (k, n, n + m) of [P B]
+    variance: FloatArray  #: (k, n, n + m) mean squares of their rounding errors
+    row_logs: FloatArray  #: (n,) what rows still lack, as powers of two, to be the same in any units
+    column_logs: FloatArray  #: (n,) the same for unknowns
+    time_log: float  #: the same for each power of s
+
+    @property
+    def size(self) -> int:
+        """Number of equations."""
+        return int(self.coefficients.shape[1])
+
+    @property
+    def matrix(self) -> FloatArray:
+        """Coefficients of P, (k, n, n)."""
+        return self.coefficients[:, :, : self.size]
+
+    def replaced(self, offsets: Offsets, eliminations: list[Elimination], caution: Caution) -> "RowSystem":
+        """Apply (17) to the dependent rows; their sources stay as they are."""
+        shifts = shifts_of(offsets, eliminations)
+        room = ((0, max(int(shift.max(initial=0)) for shift in shifts)), (0, 0), (0, 0))
+        values, squares = np.pad(self.coefficients, room), np.pad(self.variance, room)
+        row_logs = self.row_logs.copy()
+        k = len(self.coefficients)
+        for item, shift in zip(eliminations, shifts, strict=True):
+            h = item.row
+            row, square = values[:, h].copy(), squares[:, h].copy()
+            for by in np.unique(shift[item.multipliers != 0.0]).tolist():
+                chosen = (item.multipliers != 0.0) & (shift == by)
+                x, sources = item.multipliers[chosen], item.sources[chosen]
+                terms, errors = self.coefficients[:, sources], item.errors[chosen]
+                row[by : by + k] -= np.einsum("i,kij->kj", x, terms)
+                square[by : by + k] += np.einsum("i,kij->kj", x**2, self.variance[:, sources])
+                square[by : by + k] += np.einsum("i,kij->kj", errors**2 + (EPS * x) ** 2, terms**2)
+            square += (EPS * row) ** 2
+            row[tight_places(offsets, item, len(row))] = 0.0
+            nothing = _is_rounding(row, square, caution)
+            row[nothing] = square[nothing] = 0.0
+            power, row_logs[h] = self.normalization(row)
+            values[:, h], squares[:, h] = np.ldexp(row, power), np.ldexp(square, 2 * power)
+        length = int(np.flatnonzero(values.any(axis=(1, 2))).max(initial=0)) + 1
+        return replace(self, coefficients=values[:length], variance=squares[:length], row_logs=row_logs)
+
+    def normalization(self, row: FloatArray) -> tuple[int, float]:
+        """Give the power of two that scales a row of P to about one, and what it then lacks to be so in any units."""
+        speed = self.time_log * np.arange(len(row))[:, None]
+        size = float((np.abs(row[:, : self.size]) * np.exp2(self.column_logs + speed)).max(initial=0.0))
+        if size == 0.0:
+            return 0, 0.0
+        power = -round(math.log2(size))
+        return power, -math.log2(size) - power
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Units:
+    """Powers of two between the model's units and those of a `RowSystem`.
+
+    ``q = diag(columns) q~, u = diag(inputs) u~, s = time s~``
+    """
+
+    columns: FloatArray  #: (n,)
+    inputs: FloatArray  #: (m,)
+    time: float
+
+    def by_time(self, values: FloatArray, power: npt.ArrayLike) -> FloatArray:
+        """Give ``values time^power`` for integer powers, also where the factor alone is beyond all floats."""
+        exponent = math.frexp(self.time)[1] - 1
+        return np.asarray(np.ldexp(values, np.asarray(power, dtype=np.intc) * exponent))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScaledPart:
+    """A part of J in other units."""
+
+    matrix: FloatArray
+    rows: FloatArray  #: factors of the rows
+    columns: FloatArray
+
+
+def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
+    """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
+    row_logs, column_logs, time_log = logarithmic_scaling(P)
+    row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
+    speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]
+    rows = np.exp2(row_powers)[:, None]
+    first = powers_of_two(np.abs(B).max(axis=(0, 1), initial=0.0))
+    driven = B * first * rows * speed
+    second = powers_of_two(np.abs(driven).max(axis=(0, 1), initial=0.0))
+    scaled = np.concatenate([P * np.exp2(column_powers) * rows * speed, driven * second], axis=2)
+    system = RowSystem(
+        coefficients=scaled,
+        variance=(EPS * scaled) ** 2,
+        row_logs=row_logs - row_powers,
+        column_logs=column_logs - column_powers,
+        time_log=float(time_log - time_power),
+    )
+    return system, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))
+
+
+def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units."""
+    r = np.exp2(system.row_logs[rows] - offsets.equations[rows] * system.time_log)
+    c = np.exp2(system.column_logs[columns] + offsets.unknowns[columns] * system.time_log)
+    return ScaledPart(J[np.ix_(rows, columns)] * r[:, None] * c, r, c)
+
+
+def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+    """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
+    part = unit_free(system, offsets, J, rows, columns)
+    r, c = levelling_factors(part.matrix)
+    return ScaledPart(part.matrix * r[:, None] * c, part.rows * r, part.columns * c)
+
+
+def shifts_of(offsets: Offsets, eliminations: list[Elimination]) -> list[IndexArray]:
+    """Give the powers ``c_i - c_h`` of s for the sources of each elimination."""
+    return [offsets.equations[item.sources] - offsets.equations[item.row] for item in eliminations]
+
+
+def tight_places(offsets: Offsets, item: Elimination, length: int) -> tuple[IndexArray, IndexArray]:
+    """Give the powers of s and the columns at which (17) makes a row of so many powers vanish."""
+    power = offsets.unknowns[item.columns] - offsets.equations[item.row]
+    inside = (power >= 0) & (power < length)
+    return power[inside], item.columns[inside]
+
+
+def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolArray:
+    """Tell which entries are rounding errors: those below the widest gap in their ratio to the mean error.
+
+    Mean errors tell little more than a power of ten, but what is meant is far above them.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(row != 0.0, np.abs(row) / np.sqrt(square), 0.0)
+    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL))

@@ -1,0 +1,142 @@
+"""Tests that a deflation must pass before it is given out, on P(s) and A alone.
+
+    det P(s) = const det(s I - A)                                                          (19)
+
+holds for every s if and only if A has the finite eigenvalues of the model, each as often. Three points near
+the typical frequency and two beyond the fastest pole tell a count that is wrong: each eigenvalue too many or too few
+changes the ratio between them by a power of the distance. Far out P(s) can be so ill conditioned that floating point
+does not know its determinant; that of small models is formed in integers then. What the state equations lose
+against a direct solve at such points is measured as well.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.reduction.algebra.integers import as_integers, log_determinant
+from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.reduction.method.signals import StateEquations
+from halfdof_ctrl.base.spectrum import balanced_states
+
+NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
+EPS = float(np.finfo(float).eps)
+LARGEST_EXACT = 60  #: equations up to which determinants may be formed in integers
+DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
+SINGULAR = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
+AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
+DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Losses:
+    """What state equations lose against direct solves, for m inputs."""
+
+    size: FloatArray  #: (m,) largest displacement under each input
+    error: FloatArray  #: (m,) largest error in it
+    worst: float  #: of the outputs, relative to the largest at its frequency, where the direct solve can tell
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ScaledPencil:
+    """The four quadratics of a model in scaled units, before any row operation: s in units of the time scale."""
+
+    P: FloatArray  #: (3, n, n)
+    B: FloatArray  #: (3, n, m)
+    F: FloatArray  #: (3, p, n)
+    D: FloatArray  #: (3, p, m)
+
+    def at(self, s: complex) -> tuple[ComplexArray, ComplexArray]:
+        """Evaluate P and B."""
+        return _at(self.P, s), _at(self.B, s)
+
+    def is_singular(self) -> bool:
+        """Whether P(s) is singular to working precision at all points."""
+        return all(self._smallest(s) <= SINGULAR * self.P.shape[1] for s in NEAR)
+
+    def has_spectrum(self, A: FloatArray) -> bool:
+        """Whether (19) holds for A in the same units."""
+        fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
+        beyond = 1 + math.frexp(max(fastest, 1.0))[1]  # powers of two, so that P(s) can be formed exactly
+        points = [*NEAR, *(2.0**power for power in (beyond, beyond + 1))]
+        unit = np.eye(len(A))
+        of_A = np.array([np.linalg.slogdet(s * unit - A)[1] for s in points])
+        of_P = np.array([self._log_determinant(s) for s in points])
+        if np.ptp(of_P - of_A) > DRIFT and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
+            integers, scale = as_integers(self.P)
+            for place, power in ((-2, beyond), (-1, beyond + 1)):
+                exact = integers[0] + (integers[1] << power) + (integers[2] << 2 * power)
+                of_P[place] = log_determinant(exact) - self.P.shape[1] * scale * math.log(2.0)
+        return bool(np.ptp(of_P - of_A) <= DRIFT)
+
+    def _log_determinant(self, s: complex) -> float:
+        P, _ = self.at(s)
+        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
+        scale = float(np.log(rows).sum() + np.log(columns).sum())
+        return float(np.linalg.slogdet(P * rows[:, None] * columns)[1]) - scale
+
+    def losses(self, equations: StateEquations) -> "Losses":
+        """Compare the state equations, balanced, with direct solves at the points on the axis."""
+        N, m = equations.B.shape
+        A, factors = balanced_states(equations.A)
+        into, X = equations.B / factors[:, None], equations.displacement.X * factors
+        size, error, worst = np.zeros(m), np.zeros(m), 0.0
+        for s in AXIS:
+            P, B = self.at(s)
+            rows, columns = (factors[:, None] for factors in equilibrating_factors(np.abs(P), even=2.0))
+            matrix = P * rows * columns.T
+            try:
+                direct = columns * np.linalg.solve(matrix, rows * B)
+                found = X @ np.linalg.solve(s * np.eye(N) - A, into + 0j)
+            except np.linalg.LinAlgError:  # an eigenvalue
+                continue
+            for power, part in enumerate(equations.displacement.U):
+                found = found + s**power * part
+            size = np.maximum(size, np.abs(direct).max(axis=0, initial=0.0))
+            error = np.maximum(error, np.abs(found - direct).max(axis=0, initial=0.0))
+            F, output = _at(self.F, s), _at(self.F, s) @ direct + _at(self.D, s)
+            lost = float(np.abs(F @ (found - direct)).max())
+            doubt = float((np.abs(F) @ columns).max() * (np.abs(direct) / columns).max()) * np.linalg.cond(matrix)
+            if output.any() and lost > DOUBT * len(matrix) * doubt:
+                worst = max(worst, lost / float(np.abs(output).max()))
+        return Losses(size, error, worst)
+
+    def expected_loss(self, equations: StateEquations) -> float:
+        """Bound what rounding A and B to double precision makes of the outputs, relative to the largest, at AXIS.
+
+        Entry by entry, ``eps |F X (s I - A)^-1| (|A| |x| + |B|)``: the same in any units of the states, and, unlike a
+        measured error, the same for models that differ by rounding.
+        """
+        N = len(equations.A)
+        A, factors = balanced_states(equations.A)
+        into, X = equations.B / factors[:, None], equations.displacement.X * factors
+        worst = 0.0
+        for s in AXIS:
+            F, unit = _at(self.F, s), np.eye(N)
+            try:
+                inverse = np.linalg.solve(s * unit - A, unit + 0j)
+            except np.linalg.LinAlgError:  # an eigenvalue
+                continue
+            x, through = inverse @ into, F @ X @ inverse
+            output = through @ into + _at(self.D, s)
+            for power, part in enumerate(equations.displacement.U):
+                output = output + s**power * F @ part
+            error = EPS * np.abs(through) @ (np.abs(A) @ np.abs(x) + np.abs(into))
+            if output.any():
+                worst = max(worst, float(error.max(initial=0.0)) / float(np.abs(output).max()))
+        return worst
+
+    def _scaled(self, s: complex) -> ComplexArray:
+        P, _ = self.at(s)
+        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
+        return np.asarray(P * rows[:, None] * columns)
+
+    def _smallest(self, s: complex) -> float:
+        values = np.linalg.svd(self._scaled(s), compute_uv=False)
+        return float(values[-1] / values[0]) if values[0] > 0.0 else 0.0
+
+
+def _at(coefficients: FloatArray, s: complex) -> ComplexArray:
+    """Evaluate a matrix polynomial."""
+    return np.asarray(np.tensordot(s ** np.arange(len(coefficients)), coefficients, axes=1))

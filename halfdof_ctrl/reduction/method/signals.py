@@ -1,0 +1,88 @@
+"""Signals of a linear system as functions of its state and of its inputs' derivatives.
+
+w = X x + U_0 u + U_1 u' + U_2 u'' + ...,    x' = A x + B u                            (6)
+w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                            (7)
+
+Derivatives of the inputs in the equation of the state are absorbed by another choice of it, equation (5).
+"""
+
+from dataclasses import dataclass
+from itertools import zip_longest
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray, is_zero
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Signal:
+    """k signals of the form (6), for N states and m inputs."""
+
+    X: FloatArray  #: (k, N) from the state
+    U: tuple[FloatArray, ...]  #: (k, m) each, from the inputs and their derivatives; no trailing zeros
+
+    def derivative(self, A: FloatArray, B: FloatArray) -> "Signal":
+        """Differentiate once along the system's motion, equation (7)."""
+        return Signal(self.X @ A, trimmed((self.X @ B, *self.U)))
+
+    def combined(self, weights: FloatArray) -> "Signal":
+        """Give ``weights @ w``."""
+        return Signal(weights @ self.X, trimmed(tuple([weights @ part for part in self.U])))
+
+    def plus(self, other: "Signal") -> "Signal":
+        """Add another signal of the same size."""
+        parts = [_sum(mine, theirs) for mine, theirs in zip_longest(self.U, other.U)]
+        return Signal(self.X + other.X, trimmed(tuple(parts)))
+
+    def direct(self, inputs: int) -> FloatArray:
+        """Give U_0, zeros if there is none."""
+        return self.U[0] if self.U else np.zeros((self.X.shape[0], inputs))
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StateEquations:
+    """x' = A x + B u with the way back to q, for n DOFs, N states and m inputs."""
+
+    A: FloatArray  #: (N, N)
+    B: FloatArray  #: (N, m)
+    displacement: Signal  #: all n displacements, equation (4)
+    shift: tuple[FloatArray, ...]  #: E_0, E_1, ... of equation (5), (N, m) each
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Rounding:
+    """What the rounding errors of `StateEquations` are relative to."""
+
+    relative: float  #: the errors are this part of the sizes below
+    A: FloatArray  #: (N, N)
+    B: FloatArray  #: (N, m)
+    displacement: Signal
+
+
+def trimmed(parts: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    """Drop coefficients of zeros at the end."""
+    while parts and is_zero(parts[-1]):
+        parts = parts[:-1]
+    return parts
+
+
+def _sum(mine: FloatArray | None, theirs: FloatArray | None) -> FloatArray:
+    if mine is None or theirs is None:
+        return mine if theirs is None else theirs  # type: ignore[return-value]
+    return mine + theirs
+
+
+def absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple[FloatArray, ...]]:
+    """Turn x' = A x + B_0 u + B_1 u' + ... into x~' = A x~ + B u with x = x~ + E_0 u + E_1 u' + ..., (5).
+
+    Returns
+    -------
+    B : (N, m) ndarray
+    (E_0, E_1, ...) : tuple of (N, m) ndarrays
+    """
+    shift: tuple[FloatArray, ...] = ()
+    carried = driven[-1]
+    for lower in reversed(driven[:-1]):
+        shift = (carried, *shift)
+        carried = lower + A @ carried
+    return carried, shift

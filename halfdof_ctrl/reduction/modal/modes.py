@@ -1,0 +1,147 @@
+"""The lowest modes of a symmetric pair K, M of sparse matrices, M possibly singular.
+
+    K phi = omega^2 M phi,    phi^T M phi = 1
+
+By shift-and-invert Lanczos (R. B. Lehoucq, D. C. Sorensen and C. Yang, ARPACK, 1998) with one factorization of K, or of
+``K - sigma M`` with sigma < 0 where K is singular. Where few DOFs have mass, the flexibility at these gives the modes
+at once: ``M^(1/2) K^-1 M^(1/2)`` restricted to them has the eigenvalues 1 / omega^2.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, splu
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.progress import progress
+from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, times
+from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU
+
+FEW = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
+SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular
+UNSYMMETRIC = 1e-9  #: relative difference between a matrix and its transpose that is no rounding
+MASSLESS = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ShiftedStiffness:
+    """``K - sigma M`` of n DOFs, factorized."""
+
+    K: SparseMatrix
+    M: SparseMatrix
+    sigma: float  #: 0 where K is regular, else negative [rad^2/s^2]
+    factors: SparseLU
+
+    @classmethod
+    def factorized(cls, K: SparseMatrix, M: SparseMatrix) -> "ShiftedStiffness | None":
+        """Factorize K, or K with some mass where it is singular; None where both are singular."""
+        factors = SparseLU.factorized(K)
+        if not factors.is_singular:
+            return cls(K=K, M=M, sigma=0.0, factors=factors)
+        stiffness, mass = np.abs(K.diagonal()), M.diagonal()
+        speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
+        sigma = -SOFT * float(speeds[speeds > 0.0].min(initial=1.0))
+        factors = SparseLU.factorized(csc_array(K - sigma * M))
+        return None if factors.is_singular else cls(K=K, M=M, sigma=sigma, factors=factors)
+
+    def solve(self, right: FloatArray) -> FloatArray:
+        """Give ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
+        solution = np.empty_like(right, order="F")
+        for start in range(0, right.shape[1], WIDTH):
+            span = slice(start, start + WIDTH)
+            part = np.array(right[:, span], order="F")
+            solution[:, span] = self.factors.solve_transposed(part) * self.factors.rows[:, None]
+        return solution
+
+    def solve_sparse(self, right: SparseMatrix, what: str) -> FloatArray:
+        """Give ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
+        solution = np.empty(right.shape, order="F")
+        for start in progress(range(0, right.shape[1], WIDTH), what):
+            span = slice(start, start + WIDTH)
+            solution[:, span] = self.solve(right[:, span].toarray())
+        return solution
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Modes:
+    """The k lowest modes, omega rising."""
+
+    omega: FloatArray  #: (k,) [rad/s], 0 for rigid ones
+    shapes: FloatArray  #: (n, k) phi, phi^T M phi = 1
+
+
+def is_unsymmetric(matrix: SparseMatrix) -> float:
+    """Give how far a matrix is from its transpose, relative to its largest entry; 0 where that is rounding."""
+    difference = csc_array(abs(matrix - matrix.T))
+    largest = float(np.abs(matrix.data).max(initial=0.0))
+    asymmetry = float(difference.data.max(initial=0.0)) / (largest or 1.0)
+    return asymmetry if asymmetry > UNSYMMETRIC else 0.0
+
+
+def count_below(stiffness: ShiftedStiffness, omega: float) -> int:
+    """Count the modes below a frequency [rad/s].
+
+    ``K - omega^2 M = L D L^T`` has as many negative entries in D as there are modes below (J. J. Sylvester, 1852).
+    Elimination with pivots on the diagonal gives D without L having to be symmetric.
+    """
+    shifted = csc_array(stiffness.K - omega**2 * stiffness.M)
+    factors = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    return int(np.count_nonzero(factors.U.diagonal() < 0.0))
+
+
+def lowest_modes(stiffness: ShiftedStiffness, count: int) -> Modes:
+    """Find the lowest modes, as many as there are and at most `count`.
+
+    Raises
+    ------
+    ParameterError
+        Lanczos does not converge, as where M or K are not semidefinite.
+    """
+    massive = np.flatnonzero(np.diff(stiffness.M.indptr))
+    if massive.size == 0 or count == 0:
+        return Modes(np.zeros(0), np.zeros((stiffness.K.shape[0], 0)))
+    if massive.size <= max(FEW, 3 * count):
+        return _all_modes(stiffness, massive, count)
+    n, k = stiffness.K.shape[0], count
+    inverse = LinearOperator((n, n), matvec=lambda v: stiffness.solve(v.reshape(n, 1))[:, 0], dtype=np.float64)
+    start = stiffness.solve(times(stiffness.M, np.random.default_rng(0).standard_normal((n, 1))))[:, 0]
+    try:
+        squares, shapes = eigsh(stiffness.K, k=k, M=stiffness.M, sigma=stiffness.sigma, OPinv=inverse, v0=start)
+    except ArpackNoConvergence as cause:
+        msg = (
+            f"The Lanczos iteration found {len(cause.eigenvalues)} of {k} modes. Ask for fewer, and see that M and K "
+            "are positive semidefinite: a sign or unit that is wrong somewhere shows like this."
+        )
+        raise ParameterError(msg, parameter="n_modes", value=count) from cause
+    return _sorted(squares, shapes)
+
+
+def _all_modes(stiffness: ShiftedStiffness, massive: IndexArray, count: int) -> Modes:
+    """Find the modes from the flexibility at the DOFs with mass."""
+    mass = stiffness.M[massive][:, massive].toarray()
+    sizes, vectors = scipy.linalg.eigh((mass + mass.T) / 2.0)
+    kept = sizes > MASSLESS * sizes.max(initial=0.0)
+    root = vectors[:, kept] * np.sqrt(sizes[kept])  # mass = root root^T
+    flexibility = np.empty((root.shape[1], root.shape[1]))
+    for start in progress(range(0, root.shape[1], WIDTH), "flexibilities"):
+        span = slice(start, start + WIDTH)
+        flexibility[:, span] = root.T @ stiffness.solve(_spread(root[:, span], massive, stiffness))[massive]
+    inverse, turn = scipy.linalg.eigh((flexibility + flexibility.T) / 2.0)
+    first = np.argsort(-inverse)[:count]
+    shapes = stiffness.solve(_spread(root @ (turn[:, first] / inverse[first]), massive, stiffness))
+    return _sorted(1.0 / inverse[first] + stiffness.sigma, shapes)
+
+
+def _spread(values: FloatArray, places: IndexArray, stiffness: ShiftedStiffness) -> FloatArray:
+    """Put rows in their places among all DOFs, zeros elsewhere."""
+    whole = np.zeros((stiffness.K.shape[0], values.shape[1]), order="F")
+    whole[places] = values
+    return whole
+
+
+def _sorted(squares: FloatArray, shapes: FloatArray) -> Modes:
+    order = np.argsort(squares)
+    return Modes(np.sqrt(np.maximum(squares[order], 0.0)), shapes[:, order])

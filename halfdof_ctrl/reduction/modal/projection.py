@@ -1,0 +1,128 @@
+"""The projection of a model on a few motions, in coordinates that show what has no mass."""
+
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
+from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, times
+
+BLOCK = 32  #: motions that are multiplied at a time
+FAST = 1e-10  #: square of the band's upper end over a coordinate's own frequency up to which it needs no mass
+MASSLESS = 1e-13  #: of the scaled mass: combinations of coordinates below have none but rounding
+ROUNDING = 1e-12  #: of its terms: an entry below is rounding of a sum that cancels
+SPECK = 1e-8  #: of the largest entry of a combination without mass, in scaled coordinates: entries below are rounding
+FIRST = 1e3  #: weight by which kept DOFs are preferred as those that stay static
+
+
+def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: float) -> SecondOrderModel:
+    """Project a model on r motions, q = shapes p: a dense model of r DOFs.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        It gives the names.
+    parts : mapping from letter to csc_array
+        Its matrices.
+    motions : Motions
+    omega : float
+        Highest frequency that matters [rad/s].
+
+    Returns
+    -------
+    SecondOrderModel
+        Kept DOFs have their names, modes are called ``mode1, ...``, corrections ``correction1, ...``; a kept DOF of
+        which only a combination with others has mass is called ``<dof>~``.
+    """
+    kept, count = motions.kept.size, motions.omega.size
+    M, C, K = (_between(motions.shapes, parts[letter]) for letter in "MCK")
+    M, K = (M + M.T) / 2.0, (K + K.T) / 2.0
+    modal = slice(kept, kept + count)
+    M[modal, modal], K[modal, modal] = np.eye(count), np.diag(motions.omega**2)
+    signals: dict[str, Any] = {letter: np.asarray(parts[letter].T @ motions.shapes).T for letter in ("B", "Bv", "Ba")}
+    signals |= {letter: times(parts[letter], motions.shapes) for letter in ("F", "G", "H")}
+    M, turn = _massless_columns(M, K, omega, kept)
+    if turn is not None:
+        C, K = _cleaned(turn.T, C, turn), _cleaned(turn.T, K, turn)
+        signals |= {letter: turn.T @ signals[letter] for letter in ("B", "Bv", "Ba")}
+        signals |= {letter: signals[letter] @ turn for letter in ("F", "G", "H")}
+    signals |= {letter: parts[letter].toarray() for letter in ("D", "Dv", "Da")}
+    return mechss(
+        M,
+        C,
+        K,
+        **signals,
+        dofs=_names(model.dofs, motions, turn),
+        name=model.name,
+        inputs=model.inputs,
+        outputs=model.outputs,
+    )
+
+
+def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
+    """Give ``basis^T matrix basis``, some columns at a time."""
+    product = np.empty((basis.shape[1], basis.shape[1]))
+    for start in range(0, basis.shape[1], BLOCK):
+        span = slice(start, start + BLOCK)
+        product[:, span] = basis.T @ times(matrix, basis[:, span])
+    return product
+
+
+def _massless_columns(M: FloatArray, K: FloatArray, omega: float, kept: int) -> tuple[FloatArray, FloatArray | None]:
+    """Give the mass with null columns for all that has none, and the change of coordinates p = turn p' that it takes.
+
+    A coordinate whose own frequency lies far above the band needs no mass. Where combinations v of the others have none
+    but rounding, as many coordinates are made these combinations, ``p' = p`` for them; the mass of the others stays.
+    """
+    stiffness = np.abs(np.diagonal(K))
+    slow = omega**2 * np.diagonal(M) > FAST * stiffness
+    M = M * slow * slow[:, None]
+    heavy = np.flatnonzero(slow)
+    scale = np.sqrt(stiffness[heavy] + omega**2 * np.diagonal(M)[heavy]) / omega
+    ratios, vectors = scipy.linalg.eigh(M[np.ix_(heavy, heavy)] / scale / scale[:, None])
+    null = vectors[:, ratios <= MASSLESS] / scale[:, None]
+    if null.shape[1] == 0:
+        return M, None
+    weights = np.where(heavy < kept, FIRST, 1.0) * scale
+    _, _, pivots = scipy.linalg.qr((null * weights[:, None]).T, pivoting=True, mode="economic")
+    chosen = pivots[: null.shape[1]]
+    combinations = np.linalg.solve(null[chosen].T, null.T).T
+    size = np.abs(combinations) * scale[:, None]
+    combinations[size <= SPECK * size.max(axis=0)] = 0.0
+    combinations[chosen] = np.eye(chosen.size)
+    turn = np.eye(M.shape[0])
+    turn[np.ix_(heavy, heavy[chosen])] = combinations
+    M[heavy[chosen]] = 0.0
+    M[:, heavy[chosen]] = 0.0
+    return M, turn
+
+
+def _cleaned(left: FloatArray, matrix: FloatArray, right: FloatArray) -> FloatArray:
+    """Multiply, and set entries to zero that are rounding of a sum whose terms cancel."""
+    product = left @ matrix @ right
+    size = np.abs(left) @ np.abs(matrix) @ np.abs(right)
+    return np.where(np.abs(product) <= ROUNDING * size, 0.0, product)
+
+
+def _names(dofs: tuple[str, ...], motions: Motions, turn: FloatArray | None) -> tuple[str, ...]:
+    """Name the coordinates."""
+    count, corrections = motions.omega.size, motions.shapes.shape[1] - motions.kept.size - motions.omega.size
+    kept = [dofs[place] for place in motions.kept.tolist()]
+    if turn is not None:
+        mixed = np.count_nonzero(turn[: len(kept)], axis=1) > 1
+        taken = set(dofs)
+        kept = [_free_names(taken, f"{name}~")[0] if mixed[k] else name for k, name in enumerate(kept)]
+    return (*kept, *_free_names(set(dofs), "mode", count), *_free_names(set(dofs), "correction", corrections))
+
+
+def _free_names(taken: set[str], stem: str, count: int | None = None) -> tuple[str, ...]:
+    """Give a name that no DOF has, or several with numbers."""
+    while True:
+        names = [stem] if count is None else [f"{stem}{k}" for k in range(1, count + 1)]
+        if not any(name + end in taken for name in names for end in DERIVATIVE_SUFFIXES):
+            return tuple(names)
+        stem += "_"

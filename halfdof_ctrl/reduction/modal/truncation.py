@@ -1,0 +1,282 @@
+"""A small model of the modes that matter, and how far it is from the full one.
+
+Craig and Bampton's method (R. R. Craig and M. C. C. Bampton, 1968). The DOFs b that are kept are those of inputs and
+outputs, of dampers, and the half DOFs; the others, o, move with them and in modes of their own with b held still:
+
+    q_b = p_b,    q_o = Psi p_b + Phi p_m + R p_r,
+    K_oo Psi = -K_ob,    K_oo Phi = M_oo Phi diag(omega^2),
+
+with the lowest modes Phi, and R for static corrections: what the modes that are left out add at rest under the inertia
+``(M_ob + M_oo Psi)`` and under inputs and outputs that are spread over many DOFs. M, C, K, B, F, G, H are projected on
+these motions. Damping ``alpha M + beta K`` and what else is spread over the structure is projected too; no DOF is kept
+for it. At rest the small model is exact. How far it is from the full one over frequency is measured, by factorizing
+P(s) of the full model at frequencies of the band.
+Derivation: docs/explanation/truncation.md.
+"""
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+
+from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.base.errors import (
+    ComplexModelError,
+    MatrixError,
+    ParameterError,
+    TruncationWarning,
+    callers_level,
+)
+from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel, mechss
+from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.reduction.modal.projection import projected
+from halfdof_ctrl.base.sparse_arrays import as_sparse
+from halfdof_ctrl.base.threads import limited_threads
+
+POINTS = 12  #: frequencies at which the error is measured, besides resonances
+RESONANCES = 6  #: lowest resonances of the small model at which the error is measured
+DOUBTFUL = 4  #: frequencies where most is expected of it, at which it is measured too
+CANDIDATES = 200  #: frequencies among which these are looked for
+EFFORT = 4e10  #: cubes of the small model's size that this may take
+DECADES = 2.0  #: of the band below its upper end
+ALLOWED = 0.05  #: error relative to a channel's largest value above which a warning is given
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
+class TruncatedModel(SecondOrderModel):
+    """A small dense model in the place of a large one, with its measured error. Made by `truncate_modes`.
+
+    Its DOFs are those that were kept, by their names, then the modes ``mode1, mode2, ...`` and static corrections
+    ``correction1, ...``. Everything that takes a `SecondOrderModel` takes it.
+    """
+
+    full_size: int  #: DOFs of the full model
+    kept: tuple[str, ...]  #: names of the DOFs that were kept
+    mode_frequencies: FloatArray  #: (k,) of the modes that were kept, with these DOFs held [Hz]
+    band: tuple[float, float]  #: lowest and highest frequency at which the error was measured [Hz]
+    checked: FloatArray  #: (l,) frequencies at which it was measured [Hz]
+    errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value
+    #: between resonances, and at resonances to its largest of all
+
+    @property
+    def max_error(self) -> float:
+        """Largest of `errors`."""
+        return float(self.errors.max(initial=0.0))
+
+    def __repr__(self) -> str:
+        """Say what was kept of how much, and the error that was measured."""
+        i, j, k = np.unravel_index(int(self.errors.argmax()), self.errors.shape)
+        corrections = len(self.dofs) - len(self.kept) - self.mode_frequencies.size
+        modes = f"{self.mode_frequencies.size} modes"
+        if self.mode_frequencies.size:
+            modes += f" up to {self.mode_frequencies[-1]:.4g} Hz"
+        return (
+            # two arguments, since a dataclass with slots is made anew and the bare super() knows the old one
+            f"{super(TruncatedModel, self).__repr__()}\n"
+            f"  of {self.full_size} DOFs: {len(self.kept)} kept, {modes} with these held, {corrections} corrections\n"
+            f"  error from {self.band[0]:.4g} to {self.band[1]:.4g} Hz, at {self.checked.size} frequencies: "
+            f"{self.max_error:.1e} of the channel's largest value\n"
+            f"  worst: {self.outputs[i]} from {self.inputs[j]} at {self.checked[k]:.4g} Hz"
+        )
+
+
+@limited_threads(1)
+def truncate_modes(
+    model: SecondOrderModel, *, f_max: float | None = None, n_modes: int | None = None, points: int = POINTS
+) -> TruncatedModel:
+    """Make a small model of the modes that matter, and measure its error.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Real, sparse or dense, with symmetric M and K that are positive semidefinite. Choose its inputs and outputs
+        before, with `select`: their DOFs are kept.
+    f_max : float, optional
+        Highest frequency that matters [Hz]. The modes up to twice this frequency are kept, found with the kept DOFs
+        held.
+    n_modes : int, optional
+        Number of modes to keep, in the place of `f_max`; the band then reaches to half the highest of them.
+    points : int
+        Frequencies at which the full model is factorized to measure the error; up to ten come on top: resonances,
+        and where most is expected of the error.
+
+    Returns
+    -------
+    TruncatedModel
+        Dense, for `mech2ss` and everything else. Print it to see the error.
+
+    Raises
+    ------
+    ParameterError
+        Not exactly one of `f_max` and `n_modes`, one that is not positive, or no convergence of the Lanczos iteration.
+    ComplexModelError
+        The model has structural damping.
+    MatrixError
+        M or K is not symmetric.
+    ModelSizeError
+        Too many DOFs are to be kept, or too many modes lie in the band.
+    SingularPencilError
+        Parts of the structure float without mass.
+
+    Warns
+    -----
+    TruncationWarning
+        The error is above 5 per cent of a channel's largest value.
+
+    Notes
+    -----
+    DOFs are kept for every input and output that touches up to six of them, for dampers and for half DOFs. A damping
+    ``alpha M + beta K`` needs none, nor does a damping that is spread over more than 1000 DOFs. Inputs and outputs that
+    touch more DOFs get a static correction each. The error is that of the whole transfer function, phase included;
+    near resonances without damping it is large for the smallest shift of a frequency.
+
+    Examples
+    --------
+    A cantilever of 40 springs and masses, driven at its end; three modes are far fewer than 40:
+
+    >>> n = 40
+    >>> K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    >>> K[-1, -1] = 1
+    >>> chain = mechss(np.eye(n), 0.01 * K, K).select(f"F_q{n - 1}", f"q{n - 1}")
+    >>> small = truncate_modes(chain, n_modes=3)
+    >>> small.dofs, bool(small.max_error < 0.001)
+    (('q39', 'mode1', 'mode2', 'mode3', 'correction1'), True)
+    """
+    _require_band(f_max, n_modes, points)
+    _require_symmetric(model)
+    parts = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    motions = craig_bampton(parts, model.dofs, f_max, n_modes)
+    top = _band_top(parts, motions.omega, f_max)
+    small = projected(model, parts, motions, 2.0 * np.pi * top)
+    return _measured(model, small, motions, top, points)
+
+
+def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None:
+    if (f_max is None) == (n_modes is None):
+        msg = "Give either f_max, the highest frequency that matters [Hz], or n_modes, the number of modes to keep."
+        raise ParameterError(msg, parameter="f_max", value=f_max)
+    if f_max is not None and not (np.isfinite(f_max) and f_max > 0.0):
+        msg = f"f_max = {f_max} Hz, but it must be a positive frequency."
+        raise ParameterError(msg, parameter="f_max", value=f_max)
+    if n_modes is not None and not (isinstance(n_modes, int | np.integer) and n_modes > 0):
+        msg = f"n_modes = {n_modes!r}, but it must be a whole number, at least 1."
+        raise ParameterError(msg, parameter="n_modes", value=n_modes)
+    if points < 1:
+        msg = f"points = {points}, but the error is to be measured at one frequency or more."
+        raise ParameterError(msg, parameter="points", value=points)
+
+
+def _require_symmetric(model: SecondOrderModel) -> None:
+    if model.is_complex:
+        msg = (
+            f"{listed(model.complex_matrices)} has imaginary parts (structural damping): its modes are not those of M "
+            "and K, and no real small model has them. descriptor_response computes such a model as it is."
+        )
+        raise ComplexModelError(msg, matrices=model.complex_matrices)
+    for letter in "MK":
+        asymmetry = is_unsymmetric(as_sparse(getattr(model, letter)))
+        if asymmetry:
+            msg = (
+                f"{letter} is not symmetric (by {asymmetry:.1e} of its largest entry), so that it has no orthogonal "
+                "modes. If a triangle is missing, complete it; prescribe velocities and accelerations on the small "
+                "model, truncate_modes(...).prescribe_motion(...); else reduce or evaluate the model as it is."
+            )
+            raise MatrixError(msg, matrix=letter)
+
+
+def _band_top(parts: Parts, omega: FloatArray, f_max: float | None) -> float:
+    """Give the highest frequency of the band [Hz]."""
+    if f_max is not None:
+        return f_max
+    if omega.size and omega[-1] > 0.0:
+        return float(omega[-1] / (2.0 * np.pi * MARGIN))
+    stiffness, mass = np.abs(parts["K"].diagonal()), np.abs(parts["M"].diagonal())
+    speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
+    return float(np.sqrt(speeds.max(initial=0.0) or 1.0) / (2.0 * np.pi))
+
+
+def _measured(
+    model: SecondOrderModel,
+    small: SecondOrderModel,
+    motions: Motions,
+    top: float,
+    points: int,
+) -> TruncatedModel:
+    """Compare with the full model over the band."""
+    low = top / 10.0**DECADES
+    peaks = _resonances(small, low, top)
+    smooth = np.union1d(np.geomspace(low, top, points), _doubtful(small, motions, low, top))
+    frequencies = np.union1d(smooth, peaks)
+    s = 2j * np.pi * frequencies
+    found, desired = small(s, squeeze=False), model(s, squeeze=False)
+    sound = np.isfinite(found) & np.isfinite(desired)
+    difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
+    errors = _relative(difference, size)
+    elsewhere = np.isin(frequencies, smooth)  # or a sharp peak would make all errors beside it look small
+    errors[:, :, elsewhere] = _relative(difference[:, :, elsewhere], size[:, :, elsewhere])
+    fields = {letter: getattr(small, letter) for letter in LETTERS}
+    truncated = TruncatedModel(
+        **fields,
+        dofs=small.dofs,
+        inputs=small.inputs,
+        outputs=small.outputs,
+        name=small.name,
+        prescribed=model.prescribed,
+        full_size=len(model.dofs),
+        kept=tuple([model.dofs[place] for place in motions.kept.tolist()]),
+        mode_frequencies=read_only(motions.omega / (2.0 * np.pi)),
+        band=(low, top),
+        checked=read_only(frequencies),
+        errors=read_only(errors),
+    )
+    if truncated.max_error > ALLOWED:
+        said = repr(truncated).splitlines()
+        msg = f"The small model is not close to the full one:{said[-2]};{said[-1]}. Raise f_max or n_modes."
+        warnings.warn(" ".join(msg.split()), TruncationWarning, stacklevel=callers_level())
+    return truncated
+
+
+def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
+    """Give (p, m, l) differences relative to the largest size of each channel, of all where a channel is zero."""
+    largest = size.max(axis=2, keepdims=True)
+    every = max(float(size.max(initial=0.0)), float(np.finfo(float).tiny))
+    return np.asarray(difference / np.where(largest > 0.0, largest, every))
+
+
+def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
+    """Give frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
+    count = min(CANDIDATES, int(EFFORT / len(small.dofs) ** 3))
+    above = motions.kept.size + np.flatnonzero(motions.omega > 2.0 * np.pi * top)
+    if count < DOUBTFUL or above.size == 0:
+        return np.zeros(0)
+    rest = np.setdiff1d(np.arange(len(small.dofs)), above)
+    parts: dict[str, Any] = {letter: getattr(small, letter)[np.ix_(rest, rest)] for letter in "MCK"}
+    parts |= {letter: getattr(small, letter)[rest] for letter in ("B", "Bv", "Ba")}
+    parts |= {letter: getattr(small, letter)[:, rest] for letter in ("F", "G", "H")}
+    fewer = mechss(**parts, D=small.D, Dv=small.Dv, Da=small.Da)
+    frequencies = np.geomspace(low, top, count)
+    s = 2j * np.pi * frequencies
+    found, desired = fewer(s, squeeze=False), small(s, squeeze=False)
+    sound = np.isfinite(found) & np.isfinite(desired)
+    difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
+    expected = _relative(difference, size).max(axis=(0, 1))
+    peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
+    return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL]]])
+
+
+def _resonances(small: SecondOrderModel, low: float, top: float) -> FloatArray:
+    """Give the lowest resonances in the band [Hz], of a model with damping."""
+    if not small.C.any():
+        return np.zeros(0)
+    size = np.diagonal(small.K) + (2.0 * np.pi * top) ** 2 * np.diagonal(small.M)
+    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
+    K, M = (part / scale / scale[:, None] for part in (small.K, small.M))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        alpha, beta = scipy.linalg.eig(K, M, right=False, homogeneous_eigvals=True)
+        frequencies = np.sqrt(np.abs(alpha / beta)) / (2.0 * np.pi)
+    inside = np.unique(frequencies[(frequencies > low) & (frequencies < top)])
+    return np.asarray(inside[:RESONANCES])

@@ -1,0 +1,148 @@
+"""From a model to a plain `control.StateSpace` with physical names.
+
+    x' = A x + B u,    y = F q + G q' + H q'' + D u + Dv u' + Da u''
+
+with q = X x + U_0 u + U_1 u' + ... of equation (4). What remains of u', u'', ... in y makes a transfer
+function improper: it grows with frequency, and no state space has it.
+"""
+
+from typing import Literal, TypeAlias
+
+import control
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import ImproperError, ParameterError, SignalNameError
+from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
+from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.base.sparse_arrays import MatrixLike
+
+Improper: TypeAlias = Literal["refuse", "drop"]
+
+
+def mech2ss(
+    model: SecondOrderModel | ExactReduction | MatrixLike | None,
+    C: MatrixLike | None = None,
+    K: MatrixLike | None = None,
+    B: MatrixLike | None = None,
+    F: MatrixLike | None = None,
+    G: MatrixLike | None = None,
+    *,
+    H: MatrixLike | None = None,
+    D: MatrixLike | None = None,
+    dofs: Names = None,
+    inputs: Names = None,
+    outputs: Names = None,
+    name: str | None = None,
+    improper: Improper = "refuse",
+) -> control.StateSpace:
+    """Convert a mechanical model to state space, exactly.
+
+    Parameters
+    ----------
+    model : SecondOrderModel, ExactReduction, or (n, n) array_like
+        A model, a reduction of one, or the mass matrix M; with M the other arguments are those of
+        `mechss`.
+    C, K, B, F, G, H, D : array_like, optional
+        As in `mechss`; only with M.
+    dofs, inputs, outputs, name : optional
+        As in `mechss`; only with M, since a model has its names already.
+    improper : {"refuse", "drop"}, optional
+        What to do where an output follows the derivative of an input: refuse the model by name (default), or
+        give the proper part ``C (s I - A)^-1 B + D`` alone; what is dropped is
+        `ExactReduction.polynomial_part`.
+
+    Returns
+    -------
+    control.StateSpace
+        States are the displacements of inertial and half DOFs and the velocities of inertial ones. Labels
+        are the model's names, with ``.`` written as ``:`` (see `names.control_label`).
+
+    Raises
+    ------
+    MatrixError, SignalNameError
+        What `mechss` refuses.
+    ComplexModelError, SingularPencilError, UncertainRankError
+        What `exact_reduction` refuses.
+    ImproperError
+        An output follows the derivative of an input, such as the velocity of a static DOF under a
+        force of its own, and `improper` does not say that it is to be dropped.
+    ParameterError
+        `improper` is neither of what it can be.
+
+    Examples
+    --------
+    >>> mech2ss([[2]], [[0]], [[8]], [[1]]).A
+    array([[ 0.,  1.],
+           [-4.,  0.]])
+    """
+    if improper not in ("refuse", "drop"):
+        msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
+        raise ParameterError(msg, parameter="improper", value=improper)
+    if isinstance(model, SecondOrderModel | ExactReduction):
+        if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
+            msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
+            raise SignalNameError(msg, names=())
+        reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
+    else:
+        reduction = exact_reduction(
+            mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
+        )
+    output = reduction.output
+    if len(output.U) > 1 and improper == "refuse":
+        raise _improper_error(reduction.model, output)
+    model = reduction.model
+    return labelled_system(
+        reduction.A,
+        reduction.B,
+        output.X,
+        output.direct(len(model.inputs)),
+        states=reduction.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=model.name,
+    )
+
+
+def labelled_system(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    D: FloatArray,
+    *,
+    states: tuple[str, ...],
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+    name: str | None,
+) -> control.StateSpace:
+    """Make a state space whose labels are the given names, written as python-control takes them."""
+    labels = {} if name is None else {"name": control_label(name)}
+    return control.StateSpace(
+        A,
+        B,
+        C,
+        D,
+        states=list(control_labels(states)),
+        inputs=list(control_labels(inputs)),
+        outputs=list(control_labels(outputs)),
+        **labels,
+    )
+
+
+def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:
+    """Make the refusal of improper pairs, by name and with the order of growth."""
+    order = np.zeros(output.U[0].shape, dtype=int)
+    for power, part in enumerate(output.U):
+        order[part != 0.0] = power
+    pairs = tuple([(model.inputs[j], model.outputs[i], int(order[i, j])) for i, j in np.argwhere(order > 0).tolist()])
+    shown = listed([f"{result} from {cause} (grows as s^{power})" for cause, result, power in pairs], most=4)
+    msg = (
+        f"No state space has the improper transfer functions {shown}: the output follows a derivative of the input, as "
+        "the velocity of a static DOF or the acceleration of a half DOF does under a force of its own. Take another "
+        "output or input by select(), give the DOF its mass or damping, prescribe the acceleration "
+        "instead of the displacement, or filter the input; "
+        "model(s) and descriptor_response evaluate it as it is."
+    )
+    return ImproperError(msg, pairs=pairs)
