@@ -13,6 +13,7 @@ from test_relaxation import SEEDS, USUAL, drawn
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
 from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.reduction.deflation.relaxation import relaxed
+from halfdof_ctrl.reduction.deflation.row_system import RowSystem
 from halfdof_ctrl.reduction.method.signals import StateEquations
 from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 
@@ -26,10 +27,10 @@ PLENTY = np.full(12, 1e9)  # the response to each input where errors shall count
 
 def realization(model: SecondOrderModel) -> tuple[Realization, Units]:
     """Relax and solve a model's equations."""
-    system, units = scaled_rows(
+    rows, units = scaled_rows(
         np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
     )
-    result = relaxed(system, USUAL)
+    result = relaxed(RowSystem.scaled(rows), USUAL)
     assert result.offsets is not None
     return realized(result.system, result.offsets, USUAL), units
 

@@ -27,7 +27,7 @@ def system_of(P: npt.ArrayLike) -> RowSystem:
     coefficients = np.asarray(P, dtype=float)
     force = np.zeros_like(coefficients)
     force[0] = np.eye(coefficients.shape[1])
-    return scaled_rows(coefficients, force)[0]
+    return RowSystem.scaled(scaled_rows(coefficients, force)[0])
 
 
 def relaxed_model(model: SecondOrderModel) -> tuple[RowSystem, Relaxed]:

@@ -225,7 +225,7 @@ def test_slanted_dampers_take_a_single_factorization(monkeypatch: pytest.MonkeyP
     used: list[str] = []
     monkeypatch.setattr(SparseLU, "factorized", _noting(used, "factorized", SparseLU.factorized))
     reduction = exact_reduction(model)
-    assert reduction.partition.method == "orthogonal"
+    assert reduction.method == "orthogonal"
     assert len(reduction.partition.half) == 1
     assert used == ["factorized"]
     desired = model.as_dense()(POINTS, squeeze=False)
