@@ -11,6 +11,7 @@ from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, unit_free_factors
 
 RANK_TOLERANCE = 16 * EPS  #: times the block's size; singular values below are null
+ENTRIES = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
 UNCLEAR = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
 
@@ -22,6 +23,7 @@ class BlockSplit:
     singular_values: FloatArray  #: of the scaled block, falling
     rank: int  #: how many of them count
     bound: float  #: those up to this one count as zero
+    noise: float  #: those up to this one may be what rounding of the entries makes of a zero
     mixing: FloatArray  #: (d, d) combinations, those that the block sees first; orthonormal but for `factors`
     factors: FloatArray  #: (d,) scale of the columns in which they are orthonormal
     spread: float  #: of the singular values that count, the largest over the smallest; 1 if none counts
@@ -58,7 +60,8 @@ def split_block(block: FloatArray, tol: float | None) -> BlockSplit:
     spread = float(values[0] / values[rank - 1]) if rank else 1.0
     speck = 4 * max(block.shape) * EPS * spread
     clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-    return BlockSplit(values, rank, float(bound * values[0]), factors[:, None] * clean, factors, spread)
+    noise = ENTRIES * max(block.shape) * float(values[0])
+    return BlockSplit(values, rank, float(bound * values[0]), noise, factors[:, None] * clean, factors, spread)
 
 
 def lengths_of_columns(basis: FloatArray) -> FloatArray:

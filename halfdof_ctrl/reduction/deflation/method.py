@@ -23,6 +23,7 @@ from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, 
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
 from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import Loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
@@ -147,9 +148,9 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflation:
     best: Deflation | None = None
     decisions: list[BlockDecision] = []
     for found in _proposals(model, tol, decisions):
-        if found.evidence.loss <= ENOUGH or tol is not None:
+        if found.evidence.loss.value <= ENOUGH or tol is not None:
             return found
-        if best is None or found.evidence.loss < best.evidence.loss:
+        if best is None or found.evidence.loss.value < best.evidence.loss.value:
             best = found
     if best is None:
         raise _uncertain_error(model, decisions, tol)
@@ -224,7 +225,7 @@ def _in_model_units(
         evidence=Evidence(
             decisions=tuple([_decision(model, decision) for decision in relaxation.decisions]),
             rcond=result.rcond,
-            loss=losses.worst,
+            loss=Loss(losses.worst),
             altered=altered,
         ),
         tol=tol,

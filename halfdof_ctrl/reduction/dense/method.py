@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -17,7 +17,8 @@ from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 from halfdof_ctrl.reduction.method.evidence import CLOSE, Evidence, RankDecision
-from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum, loss
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
+from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal
 
@@ -25,7 +26,8 @@ NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
-LOST = 1e-9  #: by the rounding of A and B, from which on other coordinates are tried
+LOST = 1e-9  #: by the rounding of A and B at most, from which on other coordinates are tried ...
+LOOKED_AT = 1e-12  #: ... where that much is lost indeed
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,7 +38,7 @@ class SingleSolve:
     coordinates: DofPartition
     leading: LeadingMatrix  #: W of equation (2), factorized
     equations: StateEquations
-    loss: float = 0.0  #: measured where W asks for it
+    loss: Loss = NOTHING_LOST  #: measured where W asks for it
 
     @property
     def name(self) -> MethodName:
@@ -98,6 +100,16 @@ class SingleSolve:
         regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
         return (*self.coordinates.evidence, regular)
 
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the response of all DOFs to forces, by the factors of W."""
+        part, both = self.coordinates, np.hstack([force.real, force.imag])
+        real, imag = np.hsplit(self.leading.solve(np.asfortranarray(both)), 2)
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        solved = real + 1j * imag
+        rate = np.concatenate([np.zeros_like(solved[:n_i]), solved[n_i:moving], solved[:n_i]])
+        moved = self.equations.displacement.X @ states.solve(rate)
+        return np.asarray(moved + part.T[:, moving:] @ solved[moving:])
+
     def inverse_rows(self) -> FloatArray:
         """Return gamma and alpha."""
         moving = self.coordinates.n_inertial + self.coordinates.n_half
@@ -152,16 +164,24 @@ def _solved(model: SecondOrderModel, coordinates: DofPartition, *, asked: bool =
 
 
 def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolve:
-    """Measure what is lost where W is not plainly regular, and take other coordinates if these keep it."""
-    if found.leading.is_plainly_regular or tol is not None:
+    """Measure what is lost, and take other coordinates if these keep it.
+
+    Nothing worth a look is lost where the columns of a plainly regular W are those of M, C and K themselves.
+    """
+    if tol is not None or (found.leading.is_plainly_regular and found.coordinates.basis is None):
         return found
-    better = None if asked else _in_better_coordinates(found)
-    chosen = found if better is None else better
-    return replace(chosen, loss=loss(chosen.model, chosen.equations))
+    measured = replace(found, loss=measured_loss(found))
+    if asked or measured.loss.value < LOOKED_AT:
+        return measured
+    better = _in_better_coordinates(found)
+    return measured if better is None else replace(better, loss=measured_loss(better))
 
 
 def _in_better_coordinates(found: SingleSolve) -> SingleSolve | None:
-    """Give directions of little mass coordinates of their own, where that keeps digits that DOFs lose."""
+    """Give directions of little mass coordinates of their own, where that keeps digits that DOFs lose.
+
+    That is decided by bounds and not by what was measured, so that the choice is the same in any units.
+    """
     model, lost = found.model, expected_loss(found.model, found.equations)
     if lost <= LOST:
         return None

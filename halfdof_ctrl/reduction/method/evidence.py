@@ -11,6 +11,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import CloseDecisionWarning, LostDigitsWarning, NearlyMasslessWarning, callers_level
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.reduction.algebra.blocks import BlockSplit
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss
 
 CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 LOST = 1e-9  #: a state space that loses more than this against a direct solve is warned of
@@ -26,11 +27,24 @@ class RankDecision:
     singular_values: FloatArray  #: of the scaled block, falling
     rank: int  #: how many of them count
     bound: float  #: those up to this one count as zero
+    noise: float = float("inf")  #: those up to this one may be what rounding of the entries makes of a zero
 
     @classmethod
     def of(cls, matrix: Literal["M", "C"], dofs: tuple[str, ...], split: BlockSplit) -> "RankDecision":
         """Take over how a block was split."""
-        return cls(matrix=matrix, dofs=dofs, singular_values=split.singular_values, rank=split.rank, bound=split.bound)
+        return cls(
+            matrix=matrix,
+            dofs=dofs,
+            singular_values=split.singular_values,
+            rank=split.rank,
+            bound=split.bound,
+            noise=split.noise,
+        )
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a value that counts as zero is more than rounding, so that as stored the matrix has a higher rank."""
+        return self.rank < self.singular_values.size and float(self.singular_values[self.rank]) > self.noise
 
     @property
     def gap(self) -> float:
@@ -68,7 +82,7 @@ class Evidence:
     decisions: tuple[RankDecision, ...]  #: singular values of blocks of M, C or J by which their ranks were decided
     rcond: float  #: reciprocal condition number of W, or the smallest of the systems (18)
     light: LightMasses | None = None  #: masses that hardly count
-    loss: float = 0.0  #: of the largest output, by the rounding of A and B; 0 where rcond says that it is none
+    loss: Loss = NOTHING_LOST  #: by the rounding of A, B, C and D; nothing where rcond says that it is none
     hardly: bool = False  #: whether rcond is near rounding, so that the number of states rests on it
     altered: bool = False  #: whether `tol` made a state space that has another spectrum than the model, (19)
 
@@ -106,27 +120,35 @@ def _warn_of_hardly_regular(rcond: float) -> None:
     warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
 
 
-def _warn_of_lost_digits(lost: float, rcond: float) -> None:
-    """Warn where A and B lose more than 1e-9 of the largest entry of the transfer function."""
-    if lost > LOST:
+def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
+    """Warn where what is stored loses more than 1e-9 of a channel."""
+    if loss.value > LOST:
         msg = (
-            f"The state space is exact, but A and B in double precision lose {lost:.1e} of the largest entry of the "
-            "transfer function: the equations for the highest derivatives are ill conditioned "
-            f"(reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
+            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.value:.1e} of the "
+            f"transfer function, at {loss.omega:.3g} rad/s: the equations for the highest derivatives are ill "
+            f"conditioned (reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
         )
         warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
 
 
 def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
-    """Warn of decisions that rest on singular values less than 1e3 apart."""
+    """Warn of decisions that rest on singular values less than 1e3 apart, and of zeros that are more than rounding."""
     for decision in evidence:
+        values, rank = decision.singular_values, decision.rank
         if decision.gap < CLOSE:
-            values, rank = decision.singular_values, decision.rank
             zero = f"{values[rank]:.1e} as zero" if rank < values.size else f"none as zero (bound {decision.bound:.1e})"
             msg = (
                 f"A decision about a rank is close: of the singular values of a block of {decision.matrix}, "
                 f"{values[rank - 1]:.1e} counts and {zero}. It concerns DOFs {listed(decision.dofs)}: look for entries "
                 "that nearly cancel, or pass tol."
+            )
+            warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+        elif decision.is_doubtful:
+            msg = (
+                f"A block of {decision.matrix} counts as rank {rank}: its next singular value, {values[rank]:.1e} of "
+                f"{values[0]:.1e}, is taken as zero, though rounding of its entries explains {decision.noise:.1e}. "
+                f"It concerns DOFs {listed(decision.dofs)}: the numbers as they are stored have one state or two more, "
+                "very fast ones. Pass tol to say what counts as zero, or mend entries that should cancel."
             )
             warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
 

@@ -5,11 +5,11 @@ regular. Otherwise its dense copy is, so that both give the same.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.threads import limited_threads
@@ -17,6 +17,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.leading_matrix import plainly_regular
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
@@ -37,7 +38,7 @@ class SparseSolve:
     coordinates: SparsePartition
     leading: SparseLU  #: W of equation (2), factorized
     displacement: SparseDisplacement  #: equation (4), worked out where it is asked for
-    loss: float = 0.0  #: measured where W asks for it
+    loss: Loss = NOTHING_LOST  #: measured where W asks for it
 
     @property
     def name(self) -> MethodName:
@@ -93,6 +94,20 @@ class SparseSolve:
         """Return the decisions of the coordinates."""
         return self.coordinates.evidence
 
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the response of all DOFs to forces, by the factors of W."""
+        part = self.coordinates
+        both = np.hstack([force.real, force.imag]) * self.leading.rows[:, None]
+        real, imag = np.hsplit(self.leading.solve(both), 2)
+        solved = (real + 1j * imag)[part.order]
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        moved = states.solve(np.concatenate([np.zeros_like(solved[:n_i]), solved[n_i:moving], solved[:n_i]]))
+        rest = [np.zeros((self.B.shape[1], force.shape[1]))]
+        q = self.motion_at(moved.real, rest, 0) + 1j * self.motion_at(moved.imag, rest, 0)
+        static = np.zeros_like(solved)
+        static[part.order[moving:]] = solved[moving:]
+        return np.asarray(q + (static if part.columns is None else part.columns @ static))
+
     def inverse_rows(self) -> FloatArray:
         """Return gamma and alpha."""
         return self.displacement.inverse_rows()
@@ -143,7 +158,8 @@ def _solved(model: SecondOrderModel, coordinates: SparsePartition, *, asked: boo
     if not asked and n <= SMALL and leading.rcond < plainly_regular(n):
         return None
     displacement = solved_by_rows(model, coordinates, leading)
-    return SparseSolve(model=model, coordinates=coordinates, leading=leading, displacement=displacement)
+    found = SparseSolve(model=model, coordinates=coordinates, leading=leading, displacement=displacement)
+    return found if leading.rcond >= plainly_regular(n) else replace(found, loss=measured_loss(found))
 
 
 def _singular_error(
