@@ -21,7 +21,7 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix
 from halfdof_ctrl.base.exact_products import ExactPolynomial
-from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.signals import Signal
 
@@ -33,6 +33,8 @@ MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 BESIDE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are looked for if A is singular
+ROUNDINGS = 2  #: of M, C, K at random
+ZERO = 100.0  #: times what these change in it: a smaller channel is zero
 SPARSE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 
 
@@ -77,21 +79,30 @@ def measured_loss(stored: Stored) -> Loss:
     m = stored.B.shape[1]
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
     equation, output = equation_of_motion(stored.model), stored.output()
-    points, lost, values = [], [], []
+    points, lost, values, undetermined = [], [], [], []
     for s in loss_points(stored.A):
         try:
-            error, value = _lost_at(stored, equation, output, s, chosen)
+            error, value, data = _lost_at(stored, equation, output, s, chosen)
         except np.linalg.LinAlgError:  # an eigenvalue, at which nothing is determined
             continue
         points.append(float(abs(s)))
         lost.append(error)
         values.append(value)
+        undetermined.append(data)
     if not lost:
         return NOTHING_LOST
     largest = np.broadcast_to(np.max(values, axis=0), np.shape(lost))
-    relative = np.divide(lost, largest, out=np.zeros(largest.shape), where=largest > 0.0)
+    seen = largest > np.maximum(np.max(undetermined, axis=0), _rounding_of_zeros(largest[0]))
+    relative = np.divide(lost, largest, out=np.zeros(largest.shape), where=seen)
     worst = np.unravel_index(int(relative.argmax()), relative.shape)
     return Loss(float(relative[worst]), points[int(worst[0])])
+
+
+def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
+    """Return below which size a channel is zero but for rounding, in units that rows and columns have."""
+    rows = largest.max(axis=1, keepdims=True)
+    across = np.divide(largest, rows, out=np.zeros_like(largest), where=rows > 0.0).max(axis=0)
+    return np.asarray(ZERO * EPS * rows * across)
 
 
 def equation_of_motion(model: SecondOrderModel) -> ExactPolynomial:
@@ -101,21 +112,21 @@ def equation_of_motion(model: SecondOrderModel) -> ExactPolynomial:
 
 def loss_points(A: FloatArray) -> ComplexArray:
     """Choose points on the imaginary axis: beside the slowest oscillations and at the slowest real pole."""
-    poles = _slow_eigenvalues(A)
-    size = np.abs(poles)
-    moving = poles[size > AT_ORIGIN * size.max(initial=0.0)]
+    poles, bounds = _slow_eigenvalues(A)
+    moving = poles[np.abs(poles) > bounds]
     moving = moving[np.argsort(np.abs(moving))]
     swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
     chosen = np.concatenate([swinging[: MOST_POINTS - 1], real[:1]])
     return np.asarray(1j * BESIDE * (chosen if chosen.size else np.ones(1)))
 
 
-def _slow_eigenvalues(A: FloatArray) -> ComplexArray:
-    """Return all eigenvalues of a small matrix, the smallest ones of a larger one."""
-    matrix, _ = balanced_states(A)
-    N = len(matrix)
+def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    """Return all eigenvalues of a small matrix or the smallest ones, and up to which size they may be zero."""
+    N = len(A)
     if N <= FEW_STATES:
-        return np.asarray(np.linalg.eigvals(matrix) if N else np.zeros(0), dtype=np.complex128)
+        poles, rounding = eigenvalues_and_rounding(A)
+        return poles, rounding + AT_ORIGIN * np.abs(poles).max(initial=0.0)
+    matrix, _ = balanced_states(A)
     factors, shift = scipy.linalg.lu_factor(matrix, check_finite=False), 0.0
     pivots = np.abs(np.diag(factors[0]))
     if pivots.min() <= N * EPS * pivots.max():  # free motions: look beside zero
@@ -131,13 +142,14 @@ def _slow_eigenvalues(A: FloatArray) -> ComplexArray:
         found = np.asarray(some.eigenvalues)
     except ArpackError:
         found = np.zeros(0, dtype=complex)
-    return np.asarray(shift + 1.0 / found[found != 0.0], dtype=np.complex128)
+    poles = np.asarray(shift + 1.0 / found[found != 0.0], dtype=np.complex128)
+    return poles, np.full(poles.size, (AT_ORIGIN if shift == 0.0 else COARSE) * np.abs(poles).max(initial=0.0))
 
 
 def _lost_at(
     stored: Stored, equation: ExactPolynomial, output: Signal, s: complex, chosen: IndexArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the size of what is lost and of the value, (p, k) each, for k chosen inputs."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the size of what is lost, of the value, and below which it is zero, (p, k) each, for k chosen inputs."""
     model = stored.model
     states = StateSolver(stored.A, s)
     x = states.solve_exactly(stored.B[:, chosen].astype(np.complex128))
@@ -152,7 +164,11 @@ def _lost_at(
     for power, part in zip(powers, output.U, strict=False):
         said = said + power * part[:, chosen]
     missed = np.asarray(value - said + _seen(model, s, stored.answer(states, rest)))
-    return np.abs(missed), np.abs(value)
+    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate((model.K, model.C, model.M)))
+    generator = np.random.default_rng(0)
+    rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(ROUNDINGS)]
+    data = [np.abs(_seen(model, s, stored.answer(states, force.astype(np.complex128)))) for force in rounded]
+    return np.abs(missed), np.abs(value), ZERO * np.max(data, axis=0)
 
 
 class StateSolver:
