@@ -220,7 +220,7 @@ def _compare_transfer(
 def _compare_steps(
     model: SecondOrderModel, system: BalancedSystem, moving: ComplexArray, unclear: FloatArray, index: int
 ) -> tuple[float, str, float]:
-    """Follow the response to a step of each input by both roads, segment by segment."""
+    """Follow the response to a step of each input by both routes, segment by segment."""
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         return 0.0, "not followed: a step has no derivative for Bv, Ba, Dv, Da", 0.0
     plan = step_plan(moving)

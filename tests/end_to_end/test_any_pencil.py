@@ -214,7 +214,7 @@ ILL_CONDITIONED = (  # M is regular, but nearly singular in some direction acros
 
 @pytest.mark.parametrize(("kind", "size", "seed"), ILL_CONDITIONED)
 def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size: int, seed: int) -> None:
-    """States that are DOFs lose up to six digits of H(s) there; those of the default road do not, without a warning."""
+    """States that are DOFs lose up to six digits of H(s) there; those of the default method do not, without a warning."""
     generator = np.random.default_rng([seed, size])
     model = signals(generator, kind(generator, size))
     exact, (reduction, lost) = rational_transfer(model), reduced_aloud(model)
@@ -223,7 +223,7 @@ def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size
     assert errors(complete(reduction), exact).max() <= 1e-9
 
 
-def test_asking_for_a_road_keeps_its_coordinates() -> None:
+def test_asking_for_a_method_keeps_its_coordinates() -> None:
     """With ``method="selection"`` the states are DOFs, and the lost digits are told."""
     generator = np.random.default_rng([34000512, 7])
     model = signals(generator, passive(generator, 7))
@@ -247,7 +247,7 @@ POWERS = st.lists(st.integers(-9, 9), min_size=12, max_size=12)
 def test_units_change_no_decision(
     case: tuple[Structure, SecondOrderModel], columns: list[int], rows: list[int], time: int
 ) -> None:
-    """DOFs and equations in units of 2^3k and time in another: same order, index, road, states and improper pairs.
+    """DOFs and equations in units of 2^3k and time in another: same order, index, method, states and improper pairs.
 
     Powers of eight round nothing, so that the scaled model is exactly the same in other units.
     """
@@ -308,7 +308,7 @@ def test_decimal_units_change_no_decision(
 def test_leading_matrix_with_even_maxima_is_not_called_singular(
     kind: Kind, size: int, seed: int, base: float, columns: list[int], rows: list[int], time: int
 ) -> None:
-    """Regular by far in plain units, with rcond 1e-15 after its maxima were made even in these: the same road."""
+    """Regular by far in plain units, with rcond 1e-15 after its maxima were made even in these: the same method."""
     generator = np.random.default_rng(seed)
     model = signals(generator, kind(generator, size))
     other = in_units(model, base ** np.array(columns), base ** np.array(rows), base**time)

@@ -18,7 +18,7 @@ ROUNDING = 1e-13  #: of eigenvalues of a 4 x 4 matrix with entries up to 275
 FOUR_DIGITS = 5e-5  #: that the notebook prints
 
 
-def test_ex01_finds_the_published_pair_by_both_roads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_ex01_finds_the_published_pair_by_both_routes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The oscillating eigenvalue is the exact root to rounding, and two infinite ones are counted."""
     example = imported("ex01_hydromount")
     assert not plt.get_fignums()

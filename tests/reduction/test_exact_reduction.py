@@ -127,7 +127,7 @@ def test_passive_order_is_rank_m_plus_rank_m_c(structure: Structure) -> None:
 
 
 @given(structure=structures(largest=6))
-def test_both_roads_give_the_same_transfer_function(structure: Structure) -> None:
+def test_both_methods_give_the_same_transfer_function(structure: Structure) -> None:
     """Where selection of DOFs suffices, orthonormal bases give the same order and transfer function."""
     reduction = reduced(structure)
     assume(reduction.method == "selection")
@@ -323,7 +323,7 @@ def test_structure_without_any_dynamics_has_no_states() -> None:
 
 
 def test_evidence_is_printed() -> None:
-    """The repr tells the road, the count and the DOFs of each kind."""
+    """The repr tells the method, the count and the DOFs of each kind."""
     text = repr(exact_reduction(hydromount()))
     assert "by selection: 4 states, 2 infinite eigenvalues removed, index 0" in text
     assert "inertial: y\n" in text
@@ -510,18 +510,18 @@ def test_complex_model_is_refused_with_the_letters() -> None:
 
 
 def test_floating_node_is_refused_by_name() -> None:
-    """A massless node that nothing holds makes the pencil singular; on a road of W it stands in the null vector."""
+    """A massless node that nothing holds makes the pencil singular; by a method of W it stands in the null vector."""
     model = mechss(np.diag([1, 0]), None, np.diag([1, 0]), dofs=["held", "loose"])
     with pytest.raises(SingularPencilError, match="loose") as refusal:
         exact_reduction(model)
     assert refusal.value.dofs == ("loose",)
-    with pytest.raises(SingularLeadingMatrixError, match=r"DOFs loose\.") as by_road:
+    with pytest.raises(SingularLeadingMatrixError, match=r"DOFs loose\.") as by_method:
         exact_reduction(model, method="selection")
-    assert by_road.value.dofs == ("loose",)
-    assert by_road.value.rcond < 2 * EPS
+    assert by_method.value.dofs == ("loose",)
+    assert by_method.value.rcond < 2 * EPS
 
 
-def test_lagrange_multiplier_is_refused_by_a_road_of_the_leading_matrix() -> None:
+def test_lagrange_multiplier_is_refused_by_a_method_of_the_leading_matrix() -> None:
     """Two masses tied by a rigid constraint: index 3, refused with the multiplier among the names."""
     M, K = np.diag([1, 1, 0]), np.array([[2, 0, 1], [0, 3, -1], [1, -1, 0]])
     model = mechss(M, None, K, dofs=["a", "b", "force"])
@@ -544,7 +544,7 @@ def test_selection_alone_is_refused_where_mixing_is_needed() -> None:
 
 
 def test_unknown_method_is_refused() -> None:
-    """Only the three roads are known."""
+    """Only the three methods are known."""
     with pytest.raises(ParameterError, match="method must be 'selection', 'orthogonal', 'deflation' or None, not"):
         exact_reduction(hydromount(), method="magic")  # type: ignore[arg-type]
 

@@ -52,7 +52,7 @@ def test_matrices_may_be_given_directly() -> None:
 
 
 def test_reduction_may_be_given_instead_of_the_model() -> None:
-    """What was computed is not computed again, tolerance and road included."""
+    """What was computed is not computed again, tolerance and method included."""
     model = mechss(np.diag([1.0, 1e-13]), np.eye(2), np.eye(2))
     assert mech2ss(exact_reduction(model, tol=1e-6)).nstates == 3
 

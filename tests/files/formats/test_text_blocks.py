@@ -96,7 +96,7 @@ def test_a_field_that_is_no_number_is_refused(field: bytes) -> None:
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("per_line", [1, 3, 4])
 def test_lines_that_are_alike_and_lines_that_are_not_give_the_same(per_line: int, end: str) -> None:
-    """The fast road for equal lines and the slow one for others read the same fields."""
+    """The fast way for equal lines and the slow one for others read the same fields."""
     values = np.random.default_rng(2).normal(size=23)
     texts = [f"{value:25.15E}" for value in values]
     rows = ["".join(texts[k : k + per_line]) for k in range(0, 23, per_line)]

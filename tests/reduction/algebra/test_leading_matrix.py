@@ -90,7 +90,7 @@ def test_even_maxima_do_not_hide_a_regular_matrix(power: int) -> None:
     assert_allclose(solution[:, 0], 1.0 / units, rtol=ROUNDOFF)
 
 
-def test_model_with_even_maxima_goes_its_road() -> None:
+def test_model_with_even_maxima_keeps_its_method() -> None:
     """The arrow as mass: six states by selection, which refused it, with and without being asked for."""
     small = 2.0**-60
     model = mechss(arrow(small), None, np.diag([1.0 / small, small, small]))
@@ -114,10 +114,10 @@ def test_scaling_reaches_the_least_condition_number(seed: int, spread: int) -> N
 POWERS = st.lists(st.integers(-9, 9), min_size=12, max_size=12)
 
 
-@pytest.mark.parametrize("road", [select_columns, orthonormal_bases])
+@pytest.mark.parametrize("partition", [select_columns, orthonormal_bases])
 @given(case=drawn_models(), columns=POWERS, rows=POWERS, time=st.integers(-9, 9))
 def test_condition_of_the_leading_matrix_is_the_same_in_any_units(
-    road: Callable[[SecondOrderModel], DofPartition],
+    partition: Callable[[SecondOrderModel], DofPartition],
     case: tuple[Structure, SecondOrderModel],
     columns: list[int],
     rows: list[int],
@@ -127,7 +127,7 @@ def test_condition_of_the_leading_matrix_is_the_same_in_any_units(
     structure, model = case
     n = structure.size
     scaled = in_units(model, 8.0 ** np.array(columns[:n]), 8.0 ** np.array(rows[:n]), 8.0**time)
-    plain, other = [LeadingMatrix.factorized(leading_columns(one, road(one))) for one in (model, scaled)]
+    plain, other = [LeadingMatrix.factorized(leading_columns(one, partition(one))) for one in (model, scaled)]
     assert plain.is_singular == other.is_singular
     if not plain.is_singular:
         ratio = min(plain.rcond, PLAINLY_REGULAR_IF_SMALL) / min(other.rcond, PLAINLY_REGULAR_IF_SMALL)

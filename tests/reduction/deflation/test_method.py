@@ -1,4 +1,4 @@
-"""The whole road for any regular pencil: names, evidence, refusals, and the same answers in any units."""
+"""The whole method for any regular pencil: names, evidence, refusals, and the same answers in any units."""
 
 from collections.abc import Callable
 
@@ -201,10 +201,10 @@ def test_decisions_are_taken_again_where_the_first_do_not_pass(monkeypatch: pyte
         deflated(mechss(M, None, np.diag([0, 0])))
 
 
-# --- judging other roads ---------------------------------------------------------------------------------------
+# --- judging other methods -------------------------------------------------------------------------------------
 
 
-def test_spectrum_of_other_roads_is_judged_in_the_models_units() -> None:
+def test_spectrum_of_other_methods_is_judged_in_the_models_units() -> None:
     """The mount's A passes, in seconds and in microseconds; with a pole moved or missing it does not."""
     for tau in (1.0, 1e-6):
         mount = hydromount()
@@ -216,7 +216,7 @@ def test_spectrum_of_other_roads_is_judged_in_the_models_units() -> None:
 
 
 @pytest.mark.parametrize("disturbance", [0.0, 1e-6, 0.01])
-def test_lost_digits_of_other_roads_are_measured(disturbance: float) -> None:
+def test_lost_digits_of_other_methods_are_measured(disturbance: float) -> None:
     """The mount's equations lose nothing; with a wrong B they lose as much as it is wrong."""
     model = hydromount().select(inputs="F_y", outputs=["y", "y_ddot"])
     right = dense(exact_reduction(model))

@@ -53,7 +53,7 @@ def test_bases_span_the_null_spaces(structure: Structure) -> None:
 
 @given(structure=structures(), seed=st.integers(0, 2**32 - 1))
 def test_coordinates_go_there_and_back(structure: Structure, seed: int) -> None:
-    """``q = T p`` and ``p = T^-1 q`` undo each other on both roads, and T's columns multiply matrices alike."""
+    """``q = T p`` and ``p = T^-1 q`` undo each other by both methods, and T's columns multiply matrices alike."""
     q = np.random.default_rng(seed).standard_normal((structure.size, 3))
     model = structure.model()
     for part in (select_columns(model), orthonormal_bases(model)):

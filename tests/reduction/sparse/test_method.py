@@ -69,7 +69,7 @@ def test_order_is_the_degree_of_the_determinant(structure: Structure) -> None:
 
 
 @given(structure=structures(), method=st.sampled_from([None, "selection", "orthogonal"]))
-def test_every_road_gives_what_it_gives_dense(structure: Structure, method: Any) -> None:  # noqa: ANN401
+def test_every_method_gives_what_it_gives_dense(structure: Structure, method: Any) -> None:  # noqa: ANN401
     """The same refusals, and the exact transfer function."""
     mine, dense = reduced(sparse_model(structure), method), reduced(structure.model(), method)
     if isinstance(mine, str) or isinstance(dense, str):
@@ -232,8 +232,8 @@ def test_slanted_dampers_take_a_single_factorization(monkeypatch: pytest.MonkeyP
     assert_allclose(response(mech2ss(reduction)), desired, rtol=0.0, atol=TRANSFER * np.abs(desired).max())
 
 
-def test_a_singular_small_model_takes_the_dense_roads() -> None:
-    """Its refusal is that of the dense model; with a road of its own choice it stays sparse."""
+def test_a_singular_small_model_takes_the_dense_methods() -> None:
+    """Its refusal is that of the dense model; with a method of its own choice it stays sparse."""
     loose = np.diag([1.0, 1.0]), np.array([[1.0, -1.0], [-1.0, 1.0]])
     model = mechss(csc_array(np.zeros((2, 2))), None, loose[1])
     for method in ("selection", "orthogonal"):
