@@ -214,7 +214,7 @@ ILL_CONDITIONED = (  # M is regular, but nearly singular in some direction acros
 
 @pytest.mark.parametrize(("kind", "size", "seed"), ILL_CONDITIONED)
 def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size: int, seed: int) -> None:
-    """States that are DOFs lose up to six digits of H(s) there; those of the default method do not, without a warning."""
+    """States that are DOFs lose up to six digits of H(s) there, those of the default method do not: no warning."""
     generator = np.random.default_rng([seed, size])
     model = signals(generator, kind(generator, size))
     exact, (reduction, lost) = rational_transfer(model), reduced_aloud(model)

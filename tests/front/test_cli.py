@@ -49,7 +49,7 @@ def test_report_writes_the_folder_and_prints_the_papers_table(capsys: pytest.Cap
     """Eigenvalues before and after, with the infinite ones, and the check."""
     assert main(["report", "hydromount", "-o", "report"]) == 0
     printed = capsys.readouterr()
-    for words in ("-0.6897 ± 17.7059i", "-8.7797", "-3.1742", "2 infinite eigenvalues", "Cross-check passed"):
+    for words in ("-0.6897 ± 17.7059j", "-8.7797", "-3.1742", "2 infinite eigenvalues", "Cross-check passed"):
         assert words in printed.out
     assert printed.out.count("infinite             none") == 2
     assert printed.err == ""
@@ -171,7 +171,7 @@ def test_parameters_and_signals_of_the_mount_can_be_chosen(capsys: pytest.Captur
 def test_poles_prints_the_table_before_and_after(capsys: pytest.CaptureFixture[str]) -> None:
     """The paper's."""
     assert main(["poles", "hydromount"]) == 0
-    assert "-0.6897 ± 17.7059i   -0.6897 ± 17.7059i" in capsys.readouterr().out
+    assert "-0.6897 ± 17.7059j   -0.6897 ± 17.7059j" in capsys.readouterr().out
 
 
 def test_lqr_prints_and_writes_the_gain_of_the_weights(capsys: pytest.CaptureFixture[str]) -> None:
@@ -337,7 +337,7 @@ def test_the_command_runs_as_a_process_of_its_own(tmp_path: Path) -> None:
         [*COMMAND, "poles", "hydromount"], env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert (done.returncode, done.stderr) == (0, "")
-    assert r"-0.6897 \xb1 17.7059i" in done.stdout
+    assert r"-0.6897 \xb1 17.7059j" in done.stdout
     with subprocess.Popen(
         [*COMMAND, "info", "hydromount"], env=ENVIRONMENT, stdout=subprocess.PIPE, stderr=subprocess.PIPE
     ) as process:

@@ -112,7 +112,7 @@ def test_the_page_stands_alone_and_is_well_formed(written: Path) -> None:
 def test_the_page_says_what_the_paper_says(written: Path) -> None:
     """Eigenvalues with two infinite ones before, the verdict, the gain and the poles with it."""
     text = Page((written / "index.html").read_text(encoding="utf-8")).text
-    for words in ("-0.6897 ± 17.7059i", "-8.7797", "-3.1742", "Cross-check passed", "Closed-loop poles", "1.66667"):
+    for words in ("-0.6897 ± 17.7059j", "-8.7797", "-3.1742", "Cross-check passed", "Closed-loop poles", "1.66667"):
         assert words in text
     assert text.count("infinite\n") + text.count("infinitenone") >= 2
 

@@ -5,16 +5,15 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import hydromount, mech2ss, mechss
-from halfdof_ctrl.base.words import eigenvalue_in_words
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table, eigenvalues_in_words
 
 MOUNT = hydromount()
 
 
 def test_the_mount_has_the_published_eigenvalues_and_loses_two_infinite_ones() -> None:
-    """The paper's section 3: -0.6897 +- 17.7059i, -8.7797, -3.1742, two infinite before and none after."""
+    """The paper's section 3: -0.6897 +- 17.7059j, -8.7797, -3.1742, two infinite before and none after."""
     table = eigenvalue_table(MOUNT, mech2ss(MOUNT))
-    published = ("-0.6897 ± 17.7059i", "-8.7797", "-3.1742")
+    published = ("-0.6897 ± 17.7059j", "-8.7797", "-3.1742")
     assert tuple(row[:2] for row in table.rows) == (
         *zip(published, published, strict=True),
         *[("infinite", "none")] * 2,
@@ -29,7 +28,7 @@ def test_the_difference_is_the_larger_one_of_a_pair() -> None:
     model = mechss([[1.0]], [[2.0]], [[10.0]])
     moved = control.ss([[-1.0, 3.0], [-3.0, -1.25]], [[0], [1]], [[1, 0]], 0)
     (row,) = eigenvalue_table(model, moved).rows
-    assert row[0] == "-1.0000 ± 3.0000i"
+    assert row[0] == "-1.0000 ± 3.0000j"
     assert float(row[2]) == pytest.approx(0.13, abs=0.01)
 
 
@@ -49,22 +48,6 @@ def test_a_model_without_states_has_infinite_eigenvalues_only() -> None:
     assert eigenvalue_table(spring, mech2ss(spring)).rows == (("infinite", "none", ""),) * 2
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (-2.5, "-2.5000"),
-        (0.0, "0.0000"),
-        (-1e-17 + 2j, "0.0000 + 2.0000i"),
-        (-2j, "0.0000 - 2.0000i"),
-        (-1.5e-7, "-1.5000e-07"),
-        (2.5e9j, "0.0000e+00 + 2.5000e+09i"),
-    ],
-)
-def test_eigenvalues_are_written_with_four_decimals_or_digits(value: complex, text: str) -> None:
-    """Four decimals where they show the size, an exponent where they do not, and no minus zero."""
-    assert eigenvalue_in_words(value) == text
-
-
 def test_pairs_are_one_entry_in_a_list() -> None:
     """Largest first."""
-    assert eigenvalues_in_words([-1.0, -2 - 3j, -2 + 3j]) == ["-2.0000 ± 3.0000i", "-1.0000"]
+    assert eigenvalues_in_words([-1.0, -2 - 3j, -2 + 3j]) == ["-2.0000 ± 3.0000j", "-1.0000"]
