@@ -24,7 +24,7 @@ from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.writing import naming_target
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.page import MARK, Findings, PageFigure, page
+from halfdof_ctrl.page import PAGE_MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
 from halfdof_ctrl.plots.figure_files import close_figure, save_figure
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -281,7 +281,7 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
 
 def _require_own_folder(target: Path, given: PathLike) -> None:
     index = target / INDEX
-    foreign = index.exists() and not (index.is_file() and MARK in index.read_text("utf-8", errors="replace"))
+    foreign = index.exists() and not (index.is_file() and PAGE_MARK in index.read_text("utf-8", errors="replace"))
     if foreign or (target.exists() and not target.is_dir()):
         msg = f"{given}: there is something of that name that is no report. Choose another folder."
         raise FileFormatError(msg, path=str(given))
