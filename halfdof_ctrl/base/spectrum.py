@@ -4,9 +4,9 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg.lapack import dgebal
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 
-ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault
+ROUNDING_OF_A = 16 * EPS  #: relative errors in A that are no fault
 
 
 def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -39,7 +39,7 @@ def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     values, left, right = scipy.linalg.eig(matrix, left=True, right=True)  # type: ignore[misc]  # stubs lack this case
     cosine = np.abs(np.einsum("ij,ij->j", left.conj(), right))
     with np.errstate(divide="ignore"):
-        return values, np.minimum(ROUNDING * np.linalg.norm(matrix, 2) / cosine, np.finfo(float).max)
+        return values, np.minimum(ROUNDING_OF_A * np.linalg.norm(matrix, 2) / cosine, np.finfo(float).max)
 
 
 def balanced(A: FloatArray) -> FloatArray:

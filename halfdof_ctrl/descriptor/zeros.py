@@ -13,7 +13,7 @@ from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
 from halfdof_ctrl.descriptor.growth import system_pencil
 from halfdof_ctrl.descriptor.regularity import require_regular
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -93,5 +93,5 @@ def _independent_columns(matrix: Matrix) -> list[int]:
     rows, columns = equilibrating_powers(np.abs(matrix))
     _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
     pivots = np.abs(np.diagonal(triangle))
-    rank = int(np.count_nonzero(pivots > RANK_TOLERANCE * max(matrix.shape) * pivots[0]))
+    rank = int(np.count_nonzero(pivots > ZERO_PIVOT * max(matrix.shape) * pivots[0]))
     return sorted(order[:rank].tolist())

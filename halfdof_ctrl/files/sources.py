@@ -20,7 +20,7 @@ from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_lab
 
 ENDINGS = (".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping")  #: in a folder
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
-LETTERS = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
+FEM_MATRICES = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
 SIGNALS = ("B", "F", "G", "H")  #: that a file of that very name may hold
 
 
@@ -66,7 +66,7 @@ def find_sources(given: Sequence[Path] | Mapping[str, Path], titles: Mapping[str
         A file is not there or cannot be read.
     """
     told = dict(given) if isinstance(given, Mapping) else {}
-    unknown = [letter for letter in (*told, *titles) if letter not in LETTERS]
+    unknown = [letter for letter in (*told, *titles) if letter not in FEM_MATRICES]
     if unknown:
         msg = f"{listed(unknown)} is no matrix of a model. Known: M, C, K and S (structural damping)."
         raise FileFormatError(msg, path="")
@@ -148,7 +148,7 @@ def _letter(path: Path, raw: RawMatrix) -> str | None:
 def _chosen(sources: Sequence[Source], told: Mapping[str, Path], titles: Mapping[str, str]) -> dict[str, Source]:
     """Find the one matrix for each letter."""
     chosen = {}
-    for letter in LETTERS:
+    for letter in FEM_MATRICES:
         candidates = _candidates(letter, sources, told, titles)
         if len(candidates) > 1:
             found = listed([source.words for source in candidates])

@@ -24,7 +24,7 @@ Mark: TypeAlias = tuple[ComplexArray, str, dict[str, Any]]
 NONE = np.zeros(0, dtype=np.complex128)
 CROSS: dict[str, Any] = {"marker": "x", "color": "C0", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
 RING: dict[str, Any] = {"marker": "o", "color": "black", "markersize": 13.0, "markerfacecolor": "none", "zorder": 2.9}
-ZERO: dict[str, Any] = {"marker": "D", "color": "C2", "markersize": 5.0, "markerfacecolor": "white", "zorder": 2.8}
+ZERO_MARK: dict[str, Any] = {"marker": "D", "color": "C2", "markersize": 5.0, "markerfacecolor": "white", "zorder": 2.8}
 CLOSED: dict[str, Any] = {**CROSS, "color": "C3"}
 NOTHING: dict[str, Any] = {"marker": "", "color": "none"}
 
@@ -106,11 +106,11 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
         marks = [
             *_poles_of_A(sysdata, closed),
             (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
-            (zeros(sysdata), "zeros", ZERO),
+            (zeros(sysdata), "zeros", ZERO_MARK),
             (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NOTHING),
         ]
     else:
-        marks = [(np.asarray(sysdata.poles()), f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO)]
+        marks = [(np.asarray(sysdata.poles()), f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
     if feedback is not None:
         marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
     return [mark for mark in marks if mark[0].size or mark[2] is NOTHING]

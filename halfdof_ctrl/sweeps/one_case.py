@@ -27,7 +27,7 @@ from halfdof_ctrl.systems.frequency import frequency_response
 System: TypeAlias = SecondOrderModel | control.StateSpace
 Quantity: TypeAlias = Literal["poles", "response"] | Callable[[Any], object]
 
-NUMBERS = "biufc"  #: kinds of arrays that count as results
+RESULT_KINDS = "biufc"  #: kinds of arrays that count as results
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -242,7 +242,7 @@ def as_numbers(value: object) -> npt.NDArray[Any]:
         array = np.asarray(value)
     except ValueError:  # rows of different length
         array = np.empty(0, dtype=object)
-    if array.dtype.kind not in NUMBERS:
+    if array.dtype.kind not in RESULT_KINDS:
         msg = f"The function gave {type(value).__name__}, but a sweep keeps numbers and arrays of numbers alone."
         raise ParameterError(msg, parameter="function", value=type(value).__name__)
     return array

@@ -38,8 +38,8 @@ FEW_POINTS = 200  #: the same for a sparse model with many states, each a factor
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
-MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
-AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
+GRID_MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
+POLE_AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
 FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
 
 
@@ -173,7 +173,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         except NO_STATE_SPACE:
             pass
     omega = _lowest_frequencies(model)
-    return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
+    return np.geomspace(omega[0] / GRID_MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
 
 
 def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
@@ -185,7 +185,7 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
             stiffness = ShiftedStiffness.factorized(K, M)
             if stiffness is not None:
                 omega = lowest_modes(stiffness, GRID_MODES).omega
-    moving = np.asarray(omega[omega > AT_ORIGIN * omega.max(initial=0.0)])
+    moving = np.asarray(omega[omega > POLE_AT_ORIGIN * omega.max(initial=0.0)])
     if moving.size == 0:
         require_regular(model)
         msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."
@@ -200,10 +200,10 @@ def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> Fl
     damped pole the frequencies that its peak needs.
     """
     size = np.abs(poles)
-    moving = poles[size > AT_ORIGIN * size.max(initial=0.0)]
+    moving = poles[size > POLE_AT_ORIGIN * size.max(initial=0.0)]
     if moving.size == 0:
         return np.geomspace(*FALLBACK_RANGE, points)
-    low, high = np.abs(moving).min() / MARGIN, np.abs(moving).max() * MARGIN
+    low, high = np.abs(moving).min() / GRID_MARGIN, np.abs(moving).max() * GRID_MARGIN
     peaks = moving[(moving.imag > 0.0) & (np.abs(moving.real) < 0.05 * moving.imag)]
     width = np.maximum(np.abs(peaks.real), 1e-6 * peaks.imag)
     near = peaks.imag[:, None] + width[:, None] * np.linspace(-4.0, 4.0, 17)
