@@ -26,7 +26,14 @@ from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
+from halfdof_ctrl.base.errors import (
+    FileFormatError,
+    HalfdofError,
+    InterruptedResponseWarning,
+    ParameterError,
+    own_messages,
+    recording_warnings,
+)
 from halfdof_ctrl.files.models import (
     GAIN_ENDINGS,
     TABLE_ENDINGS,
@@ -347,13 +354,12 @@ def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
 
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
-    """Show each warning once, as a line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    """Show each of the package's warnings once, as a line."""
+    with recording_warnings() as caught:
         try:
             yield caught
         finally:
-            for message in dict.fromkeys(str(warning.message) for warning in caught):
+            for message in own_messages(caught):
                 _say("warning", message)
 
 

@@ -18,6 +18,7 @@ from halfdof_ctrl.base.errors import (
     MissingExtraError,
     WorkerError,
     SweepInterruptedError,
+    HalfdofWarning,
     NearlyMasslessWarning,
     CloseDecisionWarning,
     LostDigitsWarning,
@@ -27,4 +28,4 @@ from halfdof_ctrl.base.errors import (
     InterruptedResponseWarning,
 )
 
-__all__ = ['CloseDecisionWarning', 'ComplexModelError', 'FailedCasesWarning', 'FileFormatError', 'HalfdofError', 'ImportedModelWarning', 'ImproperError', 'InconsistentStateError', 'InterruptedResponseWarning', 'LostDigitsWarning', 'MatrixError', 'MissingExtraError', 'ModelSizeError', 'NearlyMasslessWarning', 'ParameterError', 'SignalNameError', 'SingularLeadingMatrixError', 'SingularPencilError', 'StabilizationError', 'SweepInterruptedError', 'TruncationWarning', 'UncertainRankError', 'WeightError', 'WorkerError']
+__all__ = ['CloseDecisionWarning', 'ComplexModelError', 'FailedCasesWarning', 'FileFormatError', 'HalfdofError', 'HalfdofWarning', 'ImportedModelWarning', 'ImproperError', 'InconsistentStateError', 'InterruptedResponseWarning', 'LostDigitsWarning', 'MatrixError', 'MissingExtraError', 'ModelSizeError', 'NearlyMasslessWarning', 'ParameterError', 'SignalNameError', 'SingularLeadingMatrixError', 'SingularPencilError', 'StabilizationError', 'SweepInterruptedError', 'TruncationWarning', 'UncertainRankError', 'WeightError', 'WorkerError']
