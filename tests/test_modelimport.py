@@ -30,7 +30,7 @@ from fe_files import (
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, descriptor_response, inspect_files, load_model, mech2ss, mechss
-from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofWarning, ImportedModelWarning
 
 REAL_FILES = pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
 SAME = 1e-9  #: relative, of frequencies; the files have 10 to 16 digits and both sides read all of them
@@ -231,7 +231,7 @@ def test_missing_damping_is_said_unless_the_files_were_chosen_by_hand(tmp_path: 
     with pytest.warns(ImportedModelWarning, match=r"K\.mtx: no damping C in K\.mtx, M\.mtx, so it is taken as zero"):
         load_model(tmp_path / "K.mtx")
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", HalfdofWarning)
         load_model([tmp_path / "K.mtx", tmp_path / "M.mtx"])
 
 
@@ -275,7 +275,7 @@ def test_no_stiffness_and_no_file_are_refused(tmp_path: Path, names: list[str], 
 def loaded(path: Path) -> SecondOrderModel | str:
     """Load a model, or give its refusal or the word that something is missing, and let nothing else happen."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", HalfdofWarning)
         warnings.filterwarnings("ignore", "(?!.*(last number|no mass|no damping))", ImportedModelWarning)
         try:
             return load_model(path)
