@@ -1,22 +1,10 @@
 """A warning fails the suite by where it is raised: deprecations in other packages' code do not, all others do."""
 
-import warnings
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import pytest
+from support.warned import raised_in
 
 from halfdof_ctrl.errors import LostDigitsWarning
-
-
-def raised_in(module: str, category: type[Warning]) -> Callable[[], None]:
-    """Make a function of a module that warns."""
-    names: dict[str, Any] = {"__name__": module, "warnings": warnings, "category": category}
-    exec("def warn(): warnings.warn('by ' + __name__, category)", names)  # noqa: S102  # written above
-    warn: Callable[[], None] = names["warn"]
-    return warn
-
 
 OURS = ["halfdof_ctrl", "halfdof_ctrl.plots.bode", "test_reduction", "support.structures", "multiprocessing.context"]
 THEIRS = ["control", "control.statesp", "numpy.linalg", "scipy.sparse._construct"]
