@@ -5,7 +5,11 @@ The attributes repeat the facts for programs.
 """
 
 import sys
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+MOST_WORDS = 300  #: characters of another library's error that are passed on
 
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
@@ -191,29 +195,50 @@ def callers_level() -> int:
     return level
 
 
-class NearlyMasslessWarning(UserWarning):
+class HalfdofWarning(UserWarning):
+    """Base of every warning of this package."""
+
+
+@contextmanager
+def recording_warnings() -> Iterator[list[warnings.WarningMessage]]:
+    """Record every warning of this package, also one that was given before, and what the filters let through of others.
+
+    Nothing is hidden from filters that turn other packages' warnings into errors.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("always", category=HalfdofWarning)
+        yield caught
+
+
+def own_messages(caught: Iterable[warnings.WarningMessage]) -> list[str]:
+    """Give the texts of this package's own warnings, each once: the user can do nothing about other packages'."""
+    own = (warning for warning in caught if issubclass(warning.category, HalfdofWarning))
+    return list(dict.fromkeys(str(warning.message) for warning in own))
+
+
+class NearlyMasslessWarning(HalfdofWarning):
     """A DOF has a mass so small against the others that its two states cost digits."""
 
 
-class CloseDecisionWarning(UserWarning):
+class CloseDecisionWarning(HalfdofWarning):
     """A decision about a rank is close: a smaller tolerance or another rounding would give another order."""
 
 
-class LostDigitsWarning(UserWarning):
+class LostDigitsWarning(HalfdofWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
-class FailedCasesWarning(UserWarning):
+class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
 
-class ImportedModelWarning(UserWarning):
+class ImportedModelWarning(HalfdofWarning):
     """What a finite-element program wrote is read as it stands, but is probably not what was meant."""
 
 
-class TruncationWarning(UserWarning):
+class TruncationWarning(HalfdofWarning):
     """A small model is far from the full one somewhere in the band that matters."""
 
 
-class InterruptedResponseWarning(UserWarning):
+class InterruptedResponseWarning(HalfdofWarning):
     """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""

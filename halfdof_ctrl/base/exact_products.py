@@ -167,7 +167,7 @@ def _added(a: Pair, b: Pair) -> Pair:
 def _cut(
     values: FloatArray, scale: npt.NDArray[np.float64], terms: int, bits: int | None = None
 ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], int]:
-    """Cut numbers into leading bits, as many below 1 / scale as sums of so many products allow, the next ones, the rest."""
+    """Cut numbers into as many leading bits as sums of so many products allow, the next ones, and the rest."""
     count = (BITS - 1 - int(np.ceil(np.log2(max(terms, 1))))) // 2 if bits is None else bits
     unit = 2.0**count
     first = np.rint(values * scale * unit) / unit / scale
