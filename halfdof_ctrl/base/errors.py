@@ -28,6 +28,16 @@ class HalfdofError(ValueError):
         return _rebuild, (type(self), str(self), self.__dict__)
 
 
+class NoStateSpaceError(HalfdofError):
+    """A model has no state space, or none that working precision can tell; its frequency response exists all the same.
+
+    Whatever needs no state space (`frequency_response`, `bode_plot`, `pole_map_plot`, `sweep`) falls back to the
+    descriptor form where this is raised, and says `why`.
+    """
+
+    why = "no state space"  #: the cause in a few words
+
+
 class MatrixError(HalfdofError):
     """A matrix cannot be used: shape, kind of entry, NaN or Inf; `matrix` is its letter."""
 
@@ -36,8 +46,10 @@ class MatrixError(HalfdofError):
         self.matrix = matrix
 
 
-class ComplexModelError(HalfdofError):
+class ComplexModelError(NoStateSpaceError):
     """A real state space was asked for a complex model; `matrices` are the complex ones."""
+
+    why = "model is complex"
 
     def __init__(self, message: str, *, matrices: tuple[str, ...]) -> None:
         super().__init__(message)
@@ -61,11 +73,13 @@ class ParameterError(HalfdofError):
         self.value = value
 
 
-class SingularLeadingMatrixError(HalfdofError):
+class SingularLeadingMatrixError(NoStateSpaceError):
     """The leading matrix W of equation (2) is singular.
 
     `dofs` take part in its null vector, `rcond` is the reciprocal condition number after scaling.
     """
+
+    why = "W is singular"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], rcond: float) -> None:
         super().__init__(message)
@@ -86,11 +100,13 @@ class SingularPencilError(HalfdofError):
         self.equations = equations
 
 
-class UncertainRankError(HalfdofError):
+class UncertainRankError(NoStateSpaceError):
     """The order of the model cannot be told to working precision.
 
     `dofs` take part in the closest decision about a rank, `gap` is the ratio of the singular values there.
     """
+
+    why = "order uncertain"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], gap: float) -> None:
         super().__init__(message)
@@ -98,8 +114,10 @@ class UncertainRankError(HalfdofError):
         self.gap = gap
 
 
-class ImproperError(HalfdofError):
+class ImproperError(NoStateSpaceError):
     """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
+
+    why = "improper"
 
     def __init__(self, message: str, *, pairs: tuple[tuple[str, str, int], ...]) -> None:
         super().__init__(message)
