@@ -15,7 +15,7 @@ from pathlib import Path
 import control
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError, own_messages, recording_warnings
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -88,15 +88,14 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with recording_warnings() as caught:
         findings = _found(model)
         shown, cut = _shown(model)
         plots = _plots(model, shown, findings.feedback)
     said = {str(warning.message): warning for warning in caught}
     for warning in said.values():
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    findings.notes.extend([*said, *cut])
+    findings.notes.extend([*own_messages(caught), *cut])
     build = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
     with naming_target(folder):
         build.mkdir()

@@ -12,12 +12,8 @@ from matplotlib.ticker import MultipleLocator
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    HalfdofError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -47,12 +43,6 @@ MOST_PHASE_STEPS = 4
 FLAT_RATIO = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
 FLAT_ROOM = 5.0  #: ... and gets this factor above and below
 RESONANCE_SPIKE = 1e5  #: a peak higher than this times that range is cut
-NO_STATE_SPACE: dict[type[HalfdofError], str] = {
-    ComplexModelError: "model is complex",
-    ImproperError: "improper",
-    SingularLeadingMatrixError: "W is singular",
-    UncertainRankError: "order uncertain",
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,8 +177,8 @@ def _curve(
             return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
             sys = mech2ss(sysdata)
-        except tuple(NO_STATE_SPACE) as error:
-            kind = f"descriptor form (no state space: {NO_STATE_SPACE[type(error)]})"
+        except NoStateSpaceError as refusal:
+            kind = f"descriptor form (no state space: {refusal.why})"
             return descriptor_response(sysdata, omega), kind, reference
         if reference is None and not (sysdata.is_sparse and len(sysdata.dofs) > LARGEST_DENSE_COPY):
             reference = sysdata

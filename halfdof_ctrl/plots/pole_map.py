@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, UncertainRankError
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
@@ -119,7 +119,7 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
         A = exact_reduction(model).A
-    except (ComplexModelError, UncertainRankError):
+    except NoStateSpaceError:
         return []
     poles = scipy.linalg.eigvals(A) if A.size else NONE
     return [(np.asarray(poles), f"poles of A{closed}", CROSS)]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.base.names import Names, force_names, motion_names, name_from_label, unknown_name_error
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
@@ -208,7 +208,7 @@ def poles_of(system: System) -> ComplexArray:
         return by_size(_eigenvalues(np.asarray(system.A)))
     try:
         return by_size(_eigenvalues(exact_reduction(system).A))
-    except (ComplexModelError, SingularLeadingMatrixError):
+    except NoStateSpaceError:
         require_regular(system)
         return by_size(pencil_structure(system).finite_eigenvalues)
 

@@ -12,11 +12,8 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.sparse_arrays import as_sparse
@@ -32,7 +29,6 @@ from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric,
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_space import mech2ss
 
-NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
@@ -132,7 +128,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
     else:
         sys = sysdata
@@ -170,7 +166,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         try:
             poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
             return default_frequencies(poles[np.abs(poles) > rounding])
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)
     return np.geomspace(omega[0] / GRID_MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
