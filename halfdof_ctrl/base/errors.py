@@ -9,8 +9,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-MOST_WORDS = 300  #: characters of another library's error that are passed on
-
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
     """Make an error again on the other side of a process boundary."""

@@ -1,10 +1,7 @@
 """The oracle: what the descriptor form itself says, by routes that the reduction does not take.
 
-The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`quadratics`), deflated
-to its finite part (`pencils`). Zeros are the finite eigenvalues of the system pencil
-
-    [ P(s)  -B(s) ]
-    [ F(s)   D(s) ]                                                                        (9)
+The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`first_order`), deflated
+to its finite part (`finite_part`).
 """
 
 from dataclasses import dataclass, field

@@ -1,4 +1,8 @@
-"""Transmission zeros from the second-order system pencil."""
+"""Invariant zeros: the finite eigenvalues of the second-order system pencil.
+
+[ P(s)  -B(s) ]
+[ F(s)   D(s) ]                                                                        (9)
+"""
 
 import warnings
 

@@ -60,7 +60,7 @@ def mech2ss(
     -------
     control.StateSpace
         States are the displacements of inertial and half DOFs and the velocities of inertial ones. Labels
-        are the model's names, with ``.`` written as ``:`` (see `names.control_label`).
+        are the model's names, with ``.`` written as ``:`` (see `~halfdof_ctrl.base.names.control_label`).
 
     Raises
     ------
