@@ -5,6 +5,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgebal
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.descriptor.found_structure import order_by_size
 
 ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault
 
@@ -66,6 +67,4 @@ def balanced_states(A: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def sorted_eigenvalues(values: ComplexArray) -> ComplexArray:
     """Sort by size, conjugate pairs with the positive imaginary part first."""
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return values[np.lexsort((-values.imag, size))]
+    return values[order_by_size(values)]
