@@ -18,6 +18,7 @@ from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
     InconsistentStateError,
+    LostDigitsWarning,
     ModelSizeError,
     SingularLeadingMatrixError,
     SingularPencilError,
