@@ -3,6 +3,7 @@
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
+    DataLimitWarning,
     FailedCasesWarning,
     FileFormatError,
     HalfdofError,
@@ -32,6 +33,7 @@ from halfdof_ctrl.base.errors import (
 __all__ = [
     "CloseDecisionWarning",
     "ComplexModelError",
+    "DataLimitWarning",
     "FailedCasesWarning",
     "FileFormatError",
     "HalfdofError",

@@ -244,6 +244,10 @@ class LostDigitsWarning(HalfdofWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
+class DataLimitWarning(HalfdofWarning):
+    """Entries known to their last digit do not determine a response to more digits than the message says."""
+
+
 class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
