@@ -38,7 +38,7 @@ PLACES = (
 AROUND = 0.3  #: of the largest: eigenvalues around zero have a smaller mean
 CHECKS = 5  #: points at which the list is proved
 SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
-SEED = 7  #: of the directions of these points
+DIRECTION_SEED = 7  #: of the directions of these points
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -256,7 +256,7 @@ def _is_proved(polynomial: ScaledPolynomial, found: _Findings, largest: float) -
     radii = np.unique(
         np.concatenate([np.quantile(size, np.linspace(0.1, 0.9, CHECKS - 2)), [low / 2.0, 2.0 * max(largest, low)]])
     )
-    angles = np.random.default_rng(SEED).uniform(0.2, 1.3, radii.size)  # off the axes
+    angles = np.random.default_rng(DIRECTION_SEED).uniform(0.2, 1.3, radii.size)  # off the axes
     points = np.asarray(radii * np.exp(1j * angles) * (1.0 + 0.01 * angles))
     with np.errstate(all="ignore"):
         right = points * polynomial.logarithmic_derivative(points)

@@ -16,8 +16,8 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 
 FAR = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
-ABSENT = 1e9  #: weight of a place without entry
-BATCH_ENTRIES = 2**20  #: complex entries of P(s) held at a time (16 MB)
+ABSENT_WEIGHT = 1e9  #: weight of a place without entry
+POLYNOMIAL_ENTRIES = 2**20  #: complex entries of P(s) held at a time (16 MB)
 SWEEPS = 3  #: of scaling P(s) at a point, rows and columns in turns
 
 
@@ -61,7 +61,7 @@ class ScaledPolynomial:
     def logarithmic_derivative(self, points: ComplexArray) -> ComplexArray:
         """Return ``p'/p = tr P(s)^-1 P'(s)`` of p = det P at every point, nan where P(s) is exactly singular."""
         found = np.full(points.shape, np.nan, dtype=np.complex128)
-        batch = max(1, BATCH_ENTRIES // max(1, self.coefficients[0].size))
+        batch = max(1, POLYNOMIAL_ENTRIES // max(1, self.coefficients[0].size))
         for start in range(0, points.size, batch):
             part = points[start : start + batch]
             P, slope = self.at(part), self.derivative_at(part)
@@ -94,7 +94,7 @@ def mean_frequency(coefficients: Sequence[Matrix]) -> float:
 def _largest_product(logs: FloatArray, present: Matrix, power: Matrix, sign: int) -> tuple[int, float]:
     """Return degree and logarithm of the largest product of entries at very small or very large s."""
     value = np.take_along_axis(logs, power[None], axis=0)[0]
-    weight = np.where(present, sign * FAR * power + value, -ABSENT)
+    weight = np.where(present, sign * FAR * power + value, -ABSENT_WEIGHT)
     rows, columns = scipy.optimize.linear_sum_assignment(weight, maximize=True)
     return int(power[rows, columns].sum()), float(value[rows, columns].sum())
 
