@@ -1,4 +1,4 @@
-"""Write tests/data/nastran anew, where pyyeti is installed: ``PYTHONPATH=tests python tests/data/write_with_pyyeti.py``.
+"""Write tests/data/nastran anew: ``PYTHONPATH=tests python tests/data/write_with_pyyeti.py`` (needs pyyeti).
 
 The tests do not need pyyeti, only these files. The program also has pyyeti read what `support.exported_files` writes.
 """
