@@ -75,7 +75,7 @@ def in_folder(folder: Path) -> Iterator[None]:
 
 @pytest.mark.parametrize("number", ["01", "03", "12", "13"])
 def test_structures_have_the_frequencies_of_an_independent_solver(tmp_path: Path, number: str) -> None:
-    """Dense linear algebra, with what scipy was given to write, against the model and a sparse solver: ten eigenvalues."""
+    """Dense linear algebra, with what scipy was given to write, against the model and a sparse solver: ten of them."""
     with pytest.warns(ImportedModelWarning, match="no damping C in"):
         model = load_model(exported.write_structure(tmp_path, number)[0])
     structure = exported.STRUCTURES[number]
