@@ -9,8 +9,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-MOST_WORDS = 300  #: characters of another library's error that are passed on
-
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
     """Make an error again on the other side of a process boundary."""
@@ -28,6 +26,16 @@ class HalfdofError(ValueError):
         return _rebuild, (type(self), str(self), self.__dict__)
 
 
+class NoStateSpaceError(HalfdofError):
+    """A model has no state space, or none that working precision can tell; its frequency response exists all the same.
+
+    Whatever needs no state space (`frequency_response`, `bode_plot`, `pole_map_plot`, `sweep`) falls back to the
+    descriptor form where this is raised, and says `why`.
+    """
+
+    why = "no state space"  #: the cause in a few words
+
+
 class MatrixError(HalfdofError):
     """A matrix cannot be used: shape, kind of entry, NaN or Inf; `matrix` is its letter."""
 
@@ -36,8 +44,10 @@ class MatrixError(HalfdofError):
         self.matrix = matrix
 
 
-class ComplexModelError(HalfdofError):
+class ComplexModelError(NoStateSpaceError):
     """A real state space was asked for a complex model; `matrices` are the complex ones."""
+
+    why = "model is complex"
 
     def __init__(self, message: str, *, matrices: tuple[str, ...]) -> None:
         super().__init__(message)
@@ -61,11 +71,13 @@ class ParameterError(HalfdofError):
         self.value = value
 
 
-class SingularLeadingMatrixError(HalfdofError):
+class SingularLeadingMatrixError(NoStateSpaceError):
     """The leading matrix W of equation (2) is singular.
 
     `dofs` take part in its null vector, `rcond` is the reciprocal condition number after scaling.
     """
+
+    why = "W is singular"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], rcond: float) -> None:
         super().__init__(message)
@@ -86,11 +98,13 @@ class SingularPencilError(HalfdofError):
         self.equations = equations
 
 
-class UncertainRankError(HalfdofError):
+class UncertainRankError(NoStateSpaceError):
     """The order of the model cannot be told to working precision.
 
     `dofs` take part in the closest decision about a rank, `gap` is the ratio of the singular values there.
     """
+
+    why = "order uncertain"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], gap: float) -> None:
         super().__init__(message)
@@ -98,8 +112,10 @@ class UncertainRankError(HalfdofError):
         self.gap = gap
 
 
-class ImproperError(HalfdofError):
+class ImproperError(NoStateSpaceError):
     """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
+
+    why = "improper"
 
     def __init__(self, message: str, *, pairs: tuple[tuple[str, str, int], ...]) -> None:
         super().__init__(message)
@@ -171,30 +187,6 @@ class MissingExtraError(FileFormatError):
         self.extra = extra
 
 
-@contextmanager
-def naming_the_file(path: object) -> Iterator[None]:
-    """Turn what goes wrong with a file's content into a refusal that names the file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
-            yield
-    except MissingExtraError as refusal:
-        msg = f"{path}: {refusal}"
-        raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal
-    except HalfdofError as refusal:
-        line = getattr(refusal, "line", None)
-        words = " ".join(str(refusal).splitlines())
-        msg = f"{path}{'' if line is None else f', line {line}'}: {words}"
-        raise FileFormatError(msg, path=str(path), line=line) from refusal
-    except OSError:
-        raise
-    except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
-        reason = " ".join(str(cause).split()) or type(cause).__name__
-        reason = reason if len(reason) <= MOST_WORDS else f"{reason[:MOST_WORDS]}..."  # some quote the file at length
-        msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
-        raise FileFormatError(msg, path=str(path)) from cause
-
-
 class WorkerError(HalfdofError):
     """Worker processes cannot start or cannot load what they are to do; `function` is its name."""
 
@@ -212,7 +204,7 @@ class SweepInterruptedError(KeyboardInterrupt):
 
 
 def callers_level() -> int:
-    """Give the `stacklevel` of a warning that is to point at the first line outside this package."""
+    """Return the `stacklevel` of a warning that is to point at the first line outside this package."""
     frame, level = sys._getframe(1), 1  # noqa: SLF001  # the way that the standard library goes too
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
         frame, level = frame.f_back, level + 1
@@ -250,6 +242,10 @@ class CloseDecisionWarning(HalfdofWarning):
 
 class LostDigitsWarning(HalfdofWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
+
+
+class DataLimitWarning(HalfdofWarning):
+    """Entries known to their last digit do not determine a response to more digits than the message says."""
 
 
 class FailedCasesWarning(HalfdofWarning):

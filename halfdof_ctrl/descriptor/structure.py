@@ -1,45 +1,40 @@
 """The oracle: what the descriptor form itself says, by routes that the reduction does not take.
 
-The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`quadratics`), deflated
-to its finite part (`pencils`). Zeros are the finite eigenvalues of the system pencil
-
-    [ P(s)  -B(s) ]
-    [ F(s)   D(s) ]                                                                        (9)
+The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`first_order`), deflated
+to its finite part (`finite_part`).
 """
 
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-import scipy.linalg
-
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.spectrum import order_by_size
+from halfdof_ctrl.descriptor.finite_part import infinite_part
+from halfdof_ctrl.descriptor.first_order import first_order_pencil
+from halfdof_ctrl.descriptor.found_structure import found_structure
+from halfdof_ctrl.descriptor.growth import improper_pairs
 from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
-from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.model.singular import causes, null_spaces
-from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.finite_part import CLEAR_MARGIN, GENERIC_POINTS, finite_part, infinite_part
-from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
-from halfdof_ctrl.model.refusals import singular_pencil_error
-from halfdof_ctrl.descriptor.regularity import require_regular_sparse
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PencilStructure:
     """Eigenvalues of ``P(s)`` for n DOFs, found without the reduction."""
 
-    finite_eigenvalues: ComplexArray  #: by QZ [rad/s], sorted by size; those at the origin are exactly zero
+    finite_eigenvalues: ComplexArray  #: [rad/s], sorted by size; those at the origin are exactly zero
+    bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
+    most_index: int  #: the index, or a larger one that the ranks up to rounding have
+    most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
-    is_regular: bool  #: whether det P(s) is not identically zero
-    gap: float  #: smallest ratio of a pivot that counts to one that does not, in all rank decisions
-    is_certain: bool  #: False if a rank decision was so close to rounding that a count may be wrong
+    is_regular: bool  #: whether det P(s) is not identically zero, exactly
+    uncertainty: tuple[str, ...]  #: what is uncertain, a sentence each
     model: SecondOrderModel = field(repr=False)  #: whose structure this is
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether nothing is uncertain: the stored numbers say all of this exactly, and rounding left no part of it."""
+        return not self.uncertainty
 
     @property
     def index(self) -> int:
@@ -52,11 +47,23 @@ class PencilStructure:
         return self.is_regular and not self.improper_pairs
 
     @cached_property  # which is why this class has no slots
+    def gap(self) -> float:
+        """Smallest ratio of a pivot that counts to one that does not where ranks are decided by their size.
+
+        The counts do not rest on it, which are exact.
+        """
+        pencil = first_order_pencil((self.model.K, self.model.C, self.model.M))
+        return infinite_part(pencil.A, pencil.E).evidence.gap
+
+    @cached_property
     def improper_pairs(self) -> tuple[tuple[str, str, int], ...]:
-        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for."""
+        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for.
+
+        Raises `UncertainRankError` where rounding left a part of its own size that may grow.
+        """
         if not self.is_regular:
             return ()
-        return improper_pairs(self.model, self.finite_eigenvalues, self.index)
+        return improper_pairs(self.model, self.finite_eigenvalues, self.most_index, self.most_finite)
 
 
 def pencil_structure(model: SecondOrderModel) -> PencilStructure:
@@ -101,149 +108,16 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     (('F_q2', 'q2', 2),)
     """
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
-    pencil = first_order_pencil((model.K, model.C, model.M))
-    finite, infinite = finite_part(pencil.A, pencil.E), infinite_part(pencil.A, pencil.E)
-    eigenvalues = _sorted(finite.eigenvalues * pencil.scale)
-    adds_up = eigenvalues.size + sum(infinite.blocks) == len(pencil.E)
-    is_clear = infinite.evidence.margin > CLEAR_MARGIN
+    found = found_structure((model.K, model.C, model.M))
+    order = order_by_size(found.values)
     return PencilStructure(
-        finite_eigenvalues=eigenvalues,
-        n_infinite=2 * len(model.dofs) - eigenvalues.size,
-        infinite_blocks=infinite.blocks,
-        is_regular=finite.is_regular,
-        gap=infinite.evidence.gap,
-        is_certain=finite.is_certain and (not finite.is_regular or (adds_up and is_clear)),
+        finite_eigenvalues=read_only(found.values[order]),
+        bounds=read_only(found.bounds[order]),
+        most_index=found.most_index,
+        most_finite=found.most,
+        n_infinite=2 * len(model.dofs) - found.values.size,
+        infinite_blocks=found.blocks,
+        is_regular=found.is_regular,
+        uncertainty=found.doubts,
         model=model,
     )
-
-
-def zeros(model: SecondOrderModel) -> ComplexArray:
-    """Find the invariant zeros from the second-order system pencil.
-
-    The pencil keeps the mechanical form, so that no zeros are lost or invented where a state space
-    would have long chains at infinity.
-
-    Parameters
-    ----------
-    model : SecondOrderModel
-        Of any index, with any number of inputs and outputs, dependent or not.
-
-    Returns
-    -------
-    (k,) complex ndarray
-        Where the system pencil has a lower rank than almost everywhere [rad/s], as often as the greatest common
-        divisor of its largest minors has that root, sorted by size; zeros at the origin are exactly zero. Among them
-        are poles of motions that the inputs do not reach or the outputs do not show; the others are the transmission
-        zeros.
-
-    Warns
-    -----
-    CloseDecisionWarning
-        Inputs or outputs are so nearly dependent that the number of zeros may be wrong.
-
-    Raises
-    ------
-    SingularPencilError
-        ``det P(s)`` vanishes identically.
-
-    Notes
-    -----
-    Deflation removes what the pencil has at infinity and what it has too much of rows and of columns (P. Van Dooren,
-    1979). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
-    zeros of the rank that is left.
-
-    Examples
-    --------
-    A mass on a damper and a spring, velocity as output: one zero, at the origin.
-
-    >>> zeros(mechss([[1]], [[2]], [[3]], [[1]], G=[[1]]))
-    array([0.+0.j])
-
-    Two oscillators; the force on the first cannot be seen in the first where the second stands still as an absorber,
-    at 2 rad/s:
-
-    >>> zeros(mechss(np.eye(2), None, [[5, -4], [-4, 4]], [1, 0], [1, 0])).imag.round(9).tolist()
-    [2.0, -2.0]
-    """
-    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
-    require_regular(model)
-    every = _independent(model)
-    pencil = first_order_pencil(system_pencil(model, *every))
-    part = finite_part(pencil.A, pencil.E)
-    if not part.is_certain:
-        msg = (
-            f"The number of zeros, {part.eigenvalues.size}, is in doubt: a rank on which it rests is hardly to be told "
-            "from rounding. Inputs or outputs depend on each other but for rounding; leave one out by select() and "
-            "compare."
-        )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    return _sorted(part.eigenvalues * pencil.scale)
-
-
-def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
-    """Pick outputs and inputs of which no one is a constant combination of others, as those change no zero."""
-    inputs = np.vstack([model.B, model.Bv, model.Ba, model.D, model.Dv, model.Da])
-    outputs = np.hstack([model.F, model.G, model.H, model.D, model.Dv, model.Da])
-    return _independent_columns(outputs.T), _independent_columns(inputs)
-
-
-def _independent_columns(matrix: Matrix) -> list[int]:
-    """Pick columns that span the range."""
-    rows, columns = equilibrating_powers(np.abs(matrix))
-    _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
-    pivots = np.abs(np.diagonal(triangle))
-    rank = int(np.count_nonzero(pivots > RANK_TOLERANCE * max(matrix.shape) * pivots[0]))
-    return sorted(order[:rank].tolist())
-
-
-def require_regular(model: SecondOrderModel) -> None:
-    """Refuse a singular pencil, naming the DOFs that nothing holds and the equations that say too little.
-
-    Raises
-    ------
-    SingularPencilError
-        ``P(s)`` is singular to working precision at three generic points.
-    """
-    if model.is_sparse:
-        require_regular_sparse(model)
-        return
-    gamma = typical_frequency(model)
-    P = model.K
-    for point in GENERIC_POINTS:
-        s = gamma * point
-        P = model.K + s * model.C + s**2 * model.M
-        if not _is_singular(P):
-            return
-    null = null_spaces(P)
-    n = len(model.dofs)
-    raise singular_pencil_error(
-        dofs=[model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))],
-        equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
-        fact=f"its rank is {n - null.dimension} of {n}, smallest singular value {null.smallest:.1e} of the largest",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
-    )
-
-
-def typical_frequency(model: SecondOrderModel) -> float:
-    """Give a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
-    return time_scale((model.K, model.C, model.M))
-
-
-def _sorted(values: ComplexArray) -> ComplexArray:
-    """Sort by size, conjugate pairs with the positive imaginary part first."""
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return values[np.lexsort((-values.imag, size))]
-
-
-def _is_singular(P: Matrix) -> bool:
-    """Tell whether an irreducible diagonal block of a square matrix is singular to working precision."""
-    for rows, columns in diagonal_blocks(P != 0.0):
-        if rows.size != columns.size:
-            return True
-        block = P[np.ix_(rows, columns)]
-        down, across = equilibrating_powers(np.abs(block))
-        values = scipy.linalg.svdvals(block * down[:, None] * across)
-        if values[-1] <= RANK_TOLERANCE * values.size * values[0]:
-            return True
-    return False

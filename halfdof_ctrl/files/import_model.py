@@ -1,6 +1,6 @@
 """Models from the files of finite-element programs, and what was found in any model file.
 
-Matrices come from `femfiles` or from the variables of one file (`containers`); here they become a `SecondOrderModel`,
+Matrices come from `assembly` or from the variables of one file (`containers`); here they become a `SecondOrderModel`,
 and what looks wrong about them becomes a warning.
 """
 
@@ -13,14 +13,16 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.arrays import checked_matrix
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, MatrixError, callers_level
+from halfdof_ctrl.base.names import checked_dofs
+from halfdof_ctrl.files.assembly import ImportedModel, read_matrices, report_on
 from halfdof_ctrl.files.containers import load_variables, texts
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, MatrixError, callers_level, naming_the_file
-from halfdof_ctrl.files.assembly import ImportedModel, read_matrices, report_on
-from halfdof_ctrl.files.import_report import ImportReport
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
-from halfdof_ctrl.base.names import checked_dofs
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, storage, with_triangle
+from halfdof_ctrl.files.import_report import ImportReport
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 FACTORIZE_NONE = 0  #: loading a model does not wait for ranks
 
@@ -32,7 +34,7 @@ def import_model(
     remove_fixed: bool,
     matrices: Mapping[str, str] | None,
 ) -> SecondOrderModel:
-    """Read a model from the files of a finite-element program, see `files.load_model`."""
+    """Read a model from the files of a finite-element program, see `models.load_model`."""
     found = read_matrices(
         given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=FACTORIZE_NONE
     )
@@ -56,7 +58,7 @@ def import_report(
     matrices: Mapping[str, str] | None,
     largest: int = LARGEST_COMPONENT,
 ) -> ImportReport:
-    """Look at the files of a finite-element program, see `files.inspect_files`."""
+    """Look at the files of a finite-element program, see `models.inspect_files`."""
     return read_matrices(given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest).report
 
 

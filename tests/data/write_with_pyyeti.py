@@ -1,4 +1,4 @@
-"""Write tests/data/nastran anew: ``PYTHONPATH=tests python tests/data/write_with_pyyeti.py`` (needs pyyeti).
+"""Write tests/data/nastran anew with pyyeti: ``PYTHONPATH=tests python tests/data/write_with_pyyeti.py``.
 
 The tests do not need pyyeti, only these files. The program also has pyyeti read what `support.exported_files` writes.
 """
@@ -8,6 +8,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+
 from support import exported_files as exported
 
 

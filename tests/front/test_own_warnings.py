@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from support.warned import raised_in
 
 import halfdof_ctrl.report
 from halfdof_ctrl import mechss
@@ -17,6 +16,7 @@ from halfdof_ctrl.cli import main
 from halfdof_ctrl.errors import HalfdofWarning, LostDigitsWarning, NearlyMasslessWarning
 from halfdof_ctrl.files.models import save_model
 from halfdof_ctrl.report import write_report
+from support.warned import raised_in
 
 COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
 LIGHT = mechss(np.diag([1.0, 1e-13]), np.eye(2), np.diag([4.0, 1.0]), dofs=["a", "b"]).select("F_a", "a")

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from support.warned import raised_in
 
 from halfdof_ctrl.errors import LostDigitsWarning
+from support.warned import raised_in
 
 OURS = [
     "halfdof_ctrl",

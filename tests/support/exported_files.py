@@ -10,10 +10,11 @@ import struct
 from pathlib import Path
 from typing import Any
 
-import fe_models
 import numpy as np
 import numpy.typing as npt
 import scipy.io
+
+from support import fe_models
 
 Matrix = npt.NDArray[Any]
 DATA = Path(__file__).parents[1] / "data" / "nastran"
