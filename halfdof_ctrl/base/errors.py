@@ -5,7 +5,6 @@ The attributes repeat the facts for programs.
 """
 
 import sys
-import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -175,9 +174,7 @@ class MissingExtraError(FileFormatError):
 def naming_the_file(path: object) -> Iterator[None]:
     """Turn what goes wrong with a file's content into a refusal that names the file."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
-            yield
+        yield  # without touching the filters of warnings, which belong to all threads
     except MissingExtraError as refusal:
         msg = f"{path}: {refusal}"
         raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal

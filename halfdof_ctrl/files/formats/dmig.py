@@ -5,10 +5,14 @@
     *       row node                row component           real part               imaginary part
 
 Entries come in fields of 8 characters, of 16 (``*``), or between commas. Form 6 is symmetric and one entry of each pair
-is written, 1 square, 2 and 9 rectangular; TIN 3, 4 is complex. Component 0 is a scalar point. INCLUDE statements are
-not followed. Source: MSC Nastran Quick Reference Guide, entries DMIG and EXTRN.
+is written, 1 square, 2 and 9 rectangular; TIN 3, 4 is complex, with POLAR as amplitude and phase [deg]. Component 0 is
+a scalar point. INCLUDE statements are not followed, and told. A name may stand more than once.
+
+Source: MSC Nastran Quick Reference Guide, entries DMIG and EXTRN.
 """
 
+import cmath
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -16,24 +20,30 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import printable
 
 SMALL, LARGE = 8, 16  #: characters of a field
 SYMMETRIC, SQUARE_FORMS, COMPLEX_TYPES = 6, (1, 6), (3, 4)
+FORMS, TYPES = (1, 2, 6, 9), (0, 1, 2, 3, 4)
+POLAR_FIELD = 5
 MOST_COMPONENT = 6
 EXPONENT = re.compile(r"(?<=[0-9.])([+-])")  #: 1.5-3 and 1.5D-3 are 1.5e-3
-DMIG = re.compile(rb"^DMIG[ *,]", re.MULTILINE | re.IGNORECASE)
-EXTRN = re.compile(rb"^EXTRN[ *,]", re.MULTILINE | re.IGNORECASE)
+DMIG = re.compile(rb"^DMIG[ *,\t]", re.MULTILINE | re.IGNORECASE)
+INCLUDE = re.compile(rb"^INCLUDE\b", re.MULTILINE | re.IGNORECASE)
+EXTRN = re.compile(rb"^EXTRN[ *,\t]", re.MULTILINE | re.IGNORECASE)
 
 
 @dataclass(slots=True)
 class _Entries:
     """A matrix while it is read."""
 
+    name: str
     form: int
     is_complex: bool
+    is_polar: bool
     rows: list[tuple[int, int]] = field(default_factory=list)  #: node and component
     columns: list[tuple[int, int]] = field(default_factory=list)
     values: list[complex] = field(default_factory=list)
@@ -64,11 +74,13 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     (('n1_u1', 'n2_u1'), [[4.0, -1.5], [-1.5, 2.0]])
     """
     found: dict[str, _Entries] = {}
+    earlier: list[_Entries] = []  #: of the same name
     for fields, line in _bulk_entries(content, "DMIG"):
         name = printable(fields[0].encode("latin-1")).lower()
         try:
             if fields[1].strip() == "0":
-                found[name] = _Entries(int(fields[2]), int(fields[3]) in COMPLEX_TYPES)
+                earlier += [found[name]] if name in found else []
+                found[name] = _opened(name, fields)
             else:
                 _add(found[name], fields)
         except KeyError as cause:
@@ -77,8 +89,10 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
         except (ValueError, IndexError) as cause:
             msg = f"a DMIG entry of {name!r} with fields that are no numbers. The file is damaged."
             raise FileFormatError(msg, path="", line=line) from cause
-    square = {name: entries for name, entries in found.items() if entries.form in SQUARE_FORMS and entries.rows}
-    matrices = [_assembled(name, entries) for name, entries in square.items()]
+    square = [entries for entries in (*earlier, *found.values()) if entries.form in SQUARE_FORMS and entries.rows]
+    doubts = ("has INCLUDE statements, which are not followed",) if INCLUDE.search(content) else ()
+    rounding = known_to(content)
+    matrices = [_assembled(entries, doubts, rounding) for entries in square]
     if not matrices:
         what = ", ".join(found) or "none"
         msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
@@ -116,6 +130,16 @@ def read_extrn(content: bytes) -> tuple[str, ...]:
     return dof_names(nodes, components)
 
 
+def _opened(name: str, fields: list[str]) -> _Entries:
+    """Read a header: form, type of the input, and whether complex values are amplitude and phase."""
+    form, kind = int(fields[2]), int(fields[3])
+    polar = int(fields[5].strip() or 0) if len(fields) > POLAR_FIELD else 0
+    if form not in FORMS or kind not in TYPES:
+        msg = f"form {form} and type {kind} are none of DMIG"
+        raise ValueError(msg)
+    return _Entries(name, form, kind in COMPLEX_TYPES, polar > 0)
+
+
 def _add(entries: _Entries, fields: list[str]) -> None:
     """Add the rows of one column."""
     column = _place(fields[1], fields[2])
@@ -126,7 +150,10 @@ def _add(entries: _Entries, fields: list[str]) -> None:
         real, imaginary = (_real(text) for text in [*group, "", ""][2:4])
         entries.rows.append(_place(group[0], group[1]))
         entries.columns.append(column)
-        entries.values.append(complex(real, imaginary if entries.is_complex else 0.0))
+        if entries.is_complex and entries.is_polar:
+            entries.values.append(cmath.rect(real, math.radians(imaginary)))
+        else:
+            entries.values.append(complex(real, imaginary if entries.is_complex else 0.0))
 
 
 def _place(node: str, component: str) -> tuple[int, int]:
@@ -153,7 +180,7 @@ def _real(text: str) -> float:
     return value
 
 
-def _assembled(name: str, entries: _Entries) -> RawMatrix:
+def _assembled(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> RawMatrix:
     places = sorted({*entries.rows, *entries.columns})
     number = {place: index for index, place in enumerate(places)}
     values = np.array(entries.values, dtype=np.complex128)
@@ -165,8 +192,11 @@ def _assembled(name: str, entries: _Entries) -> RawMatrix:
         (len(places), len(places)),
         declared=declared,
         format=f"Nastran DMIG, form {entries.form}",
-        title=name,
+        title=entries.name,
+        named=True,
         dofs=dof_names(*zip(*places, strict=True)),
+        doubts=doubts,
+        known_to=rounding,
     )
 
 
