@@ -27,6 +27,7 @@ from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
+from halfdof_ctrl.files.folders import several_models
 from halfdof_ctrl.files.models import (
     GAIN_ENDINGS,
     TABLE_ENDINGS,
@@ -110,6 +111,9 @@ def _report(arguments: argparse.Namespace) -> int:
 
 
 def _info(arguments: argparse.Namespace) -> int:
+    if arguments.model not in BUILT_IN and (several := several_models(Path(arguments.model))):
+        print(several, flush=True)
+        return DONE
     if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
         print(inspect_files(arguments.model), flush=True)
     model = _model(arguments)

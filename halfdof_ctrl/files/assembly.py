@@ -129,7 +129,7 @@ def read_matrices(
         texts=found.texts,
         known_to=rounding,
         own_layout=found.own_layout,
-        holds=found.holds,
+        holds="" if "K" in square or "S" in square else found.holds,
     )
 
 
@@ -167,8 +167,8 @@ def _completed(source: Source, triangle: Triangle | None) -> RawMatrix:
         size = f"{raw.matrix.shape[0]} x {raw.matrix.shape[1]}"
         what = source.raw.title if source.raw.named else source.path.name
         msg = (
-            f"{source.path}: {what} is {size}, but the matrices of a model must be square. If it is something else, name "
-            "the right one: matrices={'K': name}, or {'K': path}."
+            f"{source.path}: {what} is {size}, but the matrices of a model must be square. If it is something else, "
+            "name the right one: matrices={'K': name}, or {'K': path}."
         )
         raise FileFormatError(msg, path=str(source.path))
     if triangle is None:

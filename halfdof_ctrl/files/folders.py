@@ -47,11 +47,31 @@ def models_in(folder: Path) -> list[list[Path]]:
     roles = roles_in(matrices)
     groups = [
         group
-        for group in families([path for path in matrices if path.suffix.lower() not in LABELS])
+        for group in families([path for path in matrices if not _only_names_rows(path, matrices)])
         if any(path.suffix.lower() in SEVERAL or (path in roles and roles[path].letter == "K") for path in group)
     ]
     alone = [[path] for path in files if path not in matrices and _holds_stiffness(path)]
     return groups + alone
+
+
+def _only_names_rows(path: Path, others: Sequence[Path]) -> bool:
+    """Tell whether a file names rows: a mapping, or the punch file beside an OUTPUT4 file."""
+    suffix = path.suffix.lower()
+    return suffix in LABELS or (suffix == ".pch" and path.with_suffix(".op4") in others)
+
+
+def several_models(folder: Path) -> str:
+    """List the models of a folder for people, each with a file that leads to all of its own; empty if there is one."""
+    models = models_in(folder) if folder.is_dir() else []
+    if len(models) < 2:  # noqa: PLR2004  # one is no choice
+        return ""
+    lines = [f"  {_leading(files).name}: {listed([path.name for path in files])}" for files in models]
+    return "\n".join([f"{len(models)} models in {folder}; give the file before the colon:", *lines])
+
+
+def _leading(files: Sequence[Path]) -> Path:
+    roles = roles_in(files)
+    return next((path for path in files if path in roles and roles[path].letter == "K"), files[0])
 
 
 def _in_folder(folder: Path) -> list[Path]:

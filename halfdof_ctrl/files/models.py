@@ -2,8 +2,8 @@
 
 | what | endings | content |
 |---|---|---|
-| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed if there), dofs, inputs, outputs, name |
-| model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `modelimport` |
+| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed, known_to if there), dofs, inputs, outputs, name |
+| model, read only | .mtx, .matrix, .op4, .pch, .sti, .npy, .csv, ... | what programs write, see `import_model` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
 | response | .csv | one row a frequency or time, see `save_response` |
@@ -44,7 +44,7 @@ from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_model import Paths, import_model, import_report
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.tables import frequency_table, time_table
-from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
+from halfdof_ctrl.model.second_order import EPS, LETTERS, SecondOrderModel
 
 TABLE_ENDINGS = (".csv",)
 GAIN_ENDINGS = (*MATRIX_ENDINGS, *TABLE_ENDINGS)
@@ -82,6 +82,8 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or not is_zero(getattr(model, letter))]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
+    if model.known_to > EPS:
+        content = {"known_to": np.array(model.known_to), **content}
     names = {key: getattr(model, key) for key in MODEL_NAMES}
     _save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
 

@@ -6,6 +6,7 @@ else is guessed: the refusal lists what there is, with the argument that says it
 """
 
 import re
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -14,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.arrays import checked_matrix
-from halfdof_ctrl.base.errors import FileFormatError, MatrixError
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
 from halfdof_ctrl.files.formats.digits import SINGLE
@@ -130,7 +131,15 @@ def _with_parts(found: Sequence[Variable]) -> Iterator[Variable]:
     for variable in found:
         yield variable
         if variable.kind in {"struct", "cell"}:
-            yield from _with_parts([part for part in variable.parts() if part.kind != "text"])
+            yield from _with_parts([part for part in _sound_parts(variable) if part.kind != "text"])
+
+
+def _sound_parts(variable: Variable) -> list[Variable]:
+    """Look into a struct or cell array, which may be damaged where nobody asked for it."""
+    try:
+        return variable.parts()
+    except (HalfdofError, ValueError, LookupError, TypeError, OverflowError, OSError, zlib.error):
+        return []
 
 
 def _proposal(found: Sequence[Variable]) -> str:

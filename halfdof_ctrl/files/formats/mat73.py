@@ -88,11 +88,11 @@ def mat73_variables(content: bytes) -> list[Variable]:
 
 def _listed(content: bytes, file: Any, group: Any, before: str) -> list[Variable]:  # noqa: ANN401
     h5py = _h5py()
-    found = []
-    for key in list(group)[:MOST_PARTS]:
-        if not key.startswith(OWN) and isinstance(group.get(key, getlink=True), h5py.HardLink):
-            found.append(_described(content, file, group[key], f"{before}{key}", group[key].name))
-    return found
+    return [
+        _described(content, file, group[key], f"{before}{key}", group[key].name)
+        for key in list(group)[:MOST_PARTS]
+        if not key.startswith(OWN) and isinstance(group.get(key, getlink=True), h5py.HardLink)
+    ]
 
 
 def _described(content: bytes, file: Any, item: Any, name: str, where: str) -> Variable:  # noqa: ANN401

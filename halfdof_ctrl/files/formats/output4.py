@@ -10,7 +10,9 @@ its number, the first row and the count of words, and a last one whose number is
 In binary each record stands between two counts of its bytes (little or big endian, words of 4 or 8 bytes). All counts
 are checked against the bytes or lines that there are. Form 6 is symmetric, 3 a diagonal (stored as one column or
 whole), 8 an identity whose columns are not stored; factors (4, 5, 10, 13, 15) are called so. Types 1, 2 are real
-(single, double), 3, 4 complex. With words of 8 bytes each holds 4 characters of a name. Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
+(single, double), 3, 4 complex. With words of 8 bytes each holds 4 characters of a name.
+
+Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
 """
 
 import re

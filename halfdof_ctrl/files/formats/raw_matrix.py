@@ -20,7 +20,7 @@ Triangle: TypeAlias = Literal["lower", "upper"]
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 
 MOST_ROWS = 20_000_000  #: index arrays of 160 MB; a header that says more than this and the file's length is damaged
-FREE_ROWS = 100_000  #: rows that a file may say it has, whatever its length
+FREE_ROWS = 10_000  #: rows that a file may say it has, whatever its length
 EPS = 2.0**-52
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
 MATRIX_DIMENSIONS = 2

@@ -31,6 +31,7 @@ HEAD = 2**16  #: bytes in which the first line of data must stand
 SYMMETRIC = 1e-9  #: of the largest entry
 TRIPLET, LABELLED = 3, 5  #: numbers of a line that may be places and a value
 SIZES = 3  #: numbers of a line of sizes
+LONG = 64  #: lines above which a table of so few columns is no square matrix
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,6 +43,7 @@ class _Layout:
     titles: tuple[str, ...]  #: of the columns, if the first line has them
     labelled: bool  #: whether each row begins with a name
     skipped: int  #: lines before the first row
+    columns: int  #: fields of the second line
 
 
 def is_table(content: bytes) -> bool:
@@ -82,8 +84,11 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
     content = content.removeprefix(BOM)
     layout = _layout(content)
     plain = _plain(content, layout)
+    bare = not (dense or layout.labelled or layout.titles)
+    if bare and plain.count(b"\n", 0, HEAD) > LONG and layout.columns in {TRIPLET, LABELLED}:
+        return _long_by_place(plain, layout.columns, most_rows)
     table, names = _numbers(plain, layout)
-    if not (dense or layout.labelled or layout.titles) and table.shape[1] in {TRIPLET, LABELLED}:
+    if bare and table.shape[1] in {TRIPLET, LABELLED}:
         by_place = _by_place(plain, table, most_rows)
         if by_place is not None:
             return by_place
@@ -130,7 +135,9 @@ def _layout(content: bytes) -> _Layout:
     )
     labelled = bool(second) and (LIKE_NUMBER.fullmatch(second[0]) is None or (has_titles and not first[0]))
     titles = tuple([field.decode("utf-8", "replace") for field in first]) if has_titles else ()
-    return _Layout(separator, decimal_comma, titles, labelled, lines[has_titles][0] if len(lines) > has_titles else 0)
+    return _Layout(
+        separator, decimal_comma, titles, labelled, lines[has_titles][0] if len(lines) > has_titles else 0, len(second)
+    )
 
 
 def _plain(content: bytes, layout: _Layout) -> bytes:
@@ -168,13 +175,7 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
     if (places != np.rint(places)).any() or (columns == TRIPLET and (places < 0).any()):
         return None if rows == columns or columns != LABELLED else _refuse_places(table)
     if _is_size_line(table):
-        shown = " ".join([f"{size:g}" for size in table[0]])
-        msg = (
-            f"the first line, {shown}, could be the sizes of a matrix with {rows - 1} entries, or the entry of row "
-            f"{table[0, 0]:g} and column {table[0, 1]:g}. Take it away, or write the banner '%%MatrixMarket matrix "
-            "coordinate real general' before it."
-        )
-        raise FileFormatError(msg, path="", line=1)
+        raise _size_line_error(table[0], rows - 1)
     if rows != columns:
         return abaqus.read_abaqus(plain, most_rows)
     twice = len(np.unique(places, axis=0)) < rows
@@ -195,10 +196,27 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
     raise FileFormatError(msg, path="")
 
 
+def _long_by_place(plain: bytes, columns: int, most_rows: int) -> RawMatrix:
+    """Read rows that are too many for a square matrix, without parsing them twice."""
+    plain = REMARK.sub(b"", plain) if REMARK.search(plain) else plain
+    head = number_rows(b"\n".join([line for _, line in _first_lines(plain)[:LONG]]), columns, comment="#")
+    if (head[:, :-1] != np.rint(head[:, :-1])).any():
+        return _refuse_places(head)
+    first = head[0]
+    if (
+        columns == SIZES
+        and first[0] == first[1]
+        and first[2] == len([1 for line in plain.split(b"\n") if line.strip()]) - 1
+    ):
+        raise _size_line_error(first, int(first[2]))
+    return abaqus.read_abaqus(plain, most_rows)
+
+
 def _refuse_places(table: FloatArray) -> RawMatrix:
+    words = "row column value" if table.shape[1] == TRIPLET else "node, DOF, node, DOF, value"
     msg = (
-        f"{len(table)} lines of {table.shape[1]} numbers are no square matrix, and no lines of 'node, DOF, node, DOF, "
-        "value' either, since these labels must be whole numbers."
+        f"lines of {table.shape[1]} numbers that are no square matrix, and no '{words}' either, since places must be "
+        "whole numbers."
     )
     raise FileFormatError(msg, path="")
 
@@ -208,6 +226,16 @@ def _is_size_line(table: FloatArray) -> bool:
     if columns != SIZES or rows < SIZES - 1 or table[0, 0] != table[0, 1] or table[0, 2] != rows - 1:
         return False
     return bool(table[1:, :2].max() <= table[0, 0])
+
+
+def _size_line_error(first: FloatArray, entries: int) -> FileFormatError:
+    shown = " ".join([f"{size:g}" for size in first])
+    msg = (
+        f"the first line, {shown}, could be the sizes of a matrix with {entries} entries, or the entry of row "
+        f"{first[0]:g} and column {first[1]:g}. Take it away, or write the banner '%%MatrixMarket matrix coordinate real "
+        "general' before it."
+    )
+    return FileFormatError(msg, path="", line=1)
 
 
 def _asymmetry(table: FloatArray) -> float:
@@ -229,6 +257,9 @@ def _written_as_places(plain: bytes, columns: int) -> bool:
 def _dense(table: FloatArray, names: tuple[str, ...] | None, layout: _Layout, rounding: float) -> RawMatrix:
     notes = ("commas are read as decimal points",) if layout.decimal_comma else ()
     rows, columns = table.shape
+    if not table.size:
+        msg = "no rows of numbers in it. The file is empty, or cut short."
+        raise FileFormatError(msg, path="")
     if not layout.titles and rows == columns + 1 and rows > SIZES and _counts(table[0]):
         table, rows = table[1:], columns
         notes = (*notes, "its first line counts the columns and is left out")

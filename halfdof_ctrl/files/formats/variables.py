@@ -1,5 +1,6 @@
 """A variable of a file that holds several by name: what it is, known before it is read."""
 
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -40,8 +41,15 @@ class Variable:
 
     def _kind_in_words(self) -> str:
         if self.kind == "cell":
-            return "cell array of matrices" if any(part.is_matrix for part in self.parts()) else "cell array"
+            return "cell array of matrices" if _has_matrix(self.parts) else "cell array"
         return {"struct": "struct", "text": "text", "object": "object, not numbers"}.get(self.kind, self.kind)
+
+
+def _has_matrix(parts: Callable[[], list[Variable]]) -> bool:
+    try:
+        return any(part.is_matrix for part in parts())
+    except (ValueError, LookupError, TypeError, OSError, zlib.error):  # damaged, and only to be named
+        return False
 
 
 def most_unpacked(length: int) -> int:
