@@ -113,7 +113,7 @@ def read_matrices(
             [f"{letter} from {source.words}" for letter, source in found.signals.items() if letter in signals]
         ),
         unused=_unused(found, signals),
-        similar=_similar(found, raws),
+        similar=_similar(found, raws, [letter for letter, name in (matrices or {}).items() if name is None]),
         known_to=rounding,
         penalized=held,
         removed=held if remove_fixed else (),
@@ -148,16 +148,22 @@ def _unused(found: Sources, signals: Mapping[str, Any]) -> tuple[str, ...]:
     return (*shown, *[f"{path.name}: {part.words}" for path, parts in found.left.items() for part in parts])
 
 
-def _similar(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[str, ...]:
+def _similar(found: Sources, raws: Mapping[str, RawMatrix], declined: Sequence[str]) -> tuple[str, ...]:
     """Find matrices as large as the stiffness that are not used, in files whose variables have free names."""
     size = raws[next(letter for letter in ORDER if letter in raws)].matrix.shape
     names = [
         f"{source.words} ({size[0]} x {size[1]})"
         for source in found.unused
-        if source.raw.matrix.shape == size and not source.raw.format.startswith("Nastran")
+        if source.raw.matrix.shape == size
+        and not source.raw.format.startswith("Nastran")
+        and (source.letter or source.raw.title) not in declined
     ]
     parts = [(path, part) for path, variables in found.left.items() for part in variables]
-    names += [f"{path.name}: {part.words}" for path, part in parts if part.is_matrix and part.shape == size]
+    names += [
+        f"{path.name}: {part.words}"
+        for path, part in parts
+        if part.is_matrix and part.shape == size and part.name not in declined
+    ]
     return tuple(names) if size[0] > 1 else ()
 
 

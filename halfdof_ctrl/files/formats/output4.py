@@ -109,7 +109,7 @@ class _Matrix:
     def _declared(self) -> Declared:
         if self.form == SYMMETRIC_FORM:
             return "symmetric"
-        return "unsymmetric" if self.form in OTHER_FORMS else "unsaid"
+        return "unsaid" if self.form in PLAIN_FORMS else "unsymmetric"
 
     def _doubts(self) -> tuple[str, ...]:
         if self.form in PLAIN_FORMS:

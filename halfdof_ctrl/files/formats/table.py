@@ -128,12 +128,14 @@ def _layout(content: bytes) -> _Layout:
         raise FileFormatError(msg, path="")
     rows = [line for _, line in lines]
     separator, decimal_comma = _separators(rows[min(1, len(rows) - 1)])
+    decimal_comma = separator in {b";", b"\t"} and DECIMAL_COMMA.search(content) is not None
     first = _cut(rows[0], separator, decimal_comma)
     second = _cut(rows[1], separator, decimal_comma) if len(rows) > 1 else first
-    has_titles = not all(LIKE_NUMBER.fullmatch(field) for field in first) and not any(
-        LIKE_NUMBER.fullmatch(field) and not WHOLE.fullmatch(field) for field in first
-    )
-    labelled = bool(second) and (LIKE_NUMBER.fullmatch(second[0]) is None or (has_titles and not first[0]))
+    others = [field for field in first if LIKE_NUMBER.fullmatch(field) is None]
+    counted = others == [b""] and not first[0] and all(WHOLE.fullmatch(field) for field in first[1:])
+    has_titles = counted or (any(others) and all(WHOLE.fullmatch(field) for field in first if field not in others))
+    names_rows = second[:1] != [b""] and LIKE_NUMBER.fullmatch(second[0]) is None if second else False
+    labelled = names_rows or (has_titles and not first[0])
     titles = tuple([field.decode("utf-8", "replace") for field in first]) if has_titles else ()
     return _Layout(
         separator, decimal_comma, titles, labelled, lines[has_titles][0] if len(lines) > has_titles else 0, len(second)
