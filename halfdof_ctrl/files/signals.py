@@ -51,9 +51,9 @@ def require_clear_letters(
         name = source.raw.title or letter
         argument = f"matrices={{'C': {name!r}}}" if source.raw.named else f"{{'C': {source.path.name!r}, ...}}"
         msg = (
-            f"{source.path}: {letter} in {source.path.name} is {n} x {n}, as large as the stiffness, and could be {other} "
-            f"or {MEANING[letter]}. Say {argument} for damping, matrices={{{letter!r}: {name!r}}} for the other, or "
-            f"matrices={{{letter!r}: None}} to leave it out."
+            f"{source.path}: {letter} in {source.path.name} is {n} x {n}, as large as the stiffness, and could be "
+            f"{other} or {MEANING[letter]}. Say {argument} for damping, matrices={{{letter!r}: {name!r}}} for the other, "
+            f"or matrices={{{letter!r}: None}} to leave it out."
         )
         raise FileFormatError(msg, path=str(source.path))
 

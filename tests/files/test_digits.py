@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import mechss
 from halfdof_ctrl.files.definiteness import inertia
 from halfdof_ctrl.files.formats.digits import digits_in_words, digits_of, known_to
 from halfdof_ctrl.files.formats.raw_matrix import EPS
-from scipy.sparse import csc_array
 
 
 @pytest.mark.parametrize("digits", range(6, 15))

@@ -63,7 +63,7 @@ def test_a_workspace_of_octave_is_no_table(tmp_path: Path) -> None:
 
 
 def test_numbers_that_matlab_saves_as_text_are_a_table(tmp_path: Path) -> None:
-    """save -ascii K.mat."""
+    """By save -ascii K.mat."""
     np.savetxt(tmp_path / "K.mat", K)
     model = load_model(tmp_path / "K.mat", matrices={"M": None, "C": None})
     assert model.K.toarray().tolist() == K.tolist()  # type: ignore[union-attr]

@@ -123,7 +123,7 @@ def test_a_packed_file_is_not_unpacked_out_of_proportion(tmp_path: Path) -> None
             + b"\n"
         )
         archive.writestr("K.npy", head + bytes(8 * 4000**2))
-    with pytest.raises(FileFormatError, match="more than are unpacked from .* save it sparse"):
+    with pytest.raises(FileFormatError, match=r"more than are unpacked from .* save it sparse"):
         load_model(tmp_path / "a.npz")
 
 

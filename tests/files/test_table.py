@@ -102,7 +102,7 @@ def test_a_long_file_with_a_line_of_sizes_is_refused() -> None:
     """Where the table is not looked at as a whole."""
     lines = [f"{i} {i} 2.5" for i in range(1, 200)]
     np.testing.assert_array_equal(read("\n".join(lines) + "\n").matrix.toarray(), 2.5 * np.eye(199))
-    with pytest.raises(FileFormatError, match="could be the sizes of a matrix with 199 entries"):
+    with pytest.raises(FileFormatError, match=r"could be the sizes of a matrix with 199 entries"):
         read("\n".join(["199 199 199", *lines]) + "\n")
 
 
@@ -115,5 +115,5 @@ def test_files_that_count_from_zero_and_from_one_do_not_make_a_model(tmp_path: P
     """A mass whose first DOF has none cannot show how it counts."""
     (tmp_path / "K.txt").write_text("0 0 50\n1 0 -20\n1 1 50\n2 1 -30\n2 2 30.5\n")
     (tmp_path / "M.txt").write_text("1 1 2.5\n2 2 2.5\n")
-    with pytest.raises(FileFormatError, match="counted from 0, but M.txt has no entry in a row 0"):
+    with pytest.raises(FileFormatError, match=r"counted from 0, but M\.txt has no entry in a row 0"):
         load_model({"K": tmp_path / "K.txt", "M": tmp_path / "M.txt"})

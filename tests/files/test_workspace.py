@@ -95,7 +95,7 @@ def test_half_a_matrix_is_told_and_completed_on_request(tmp_path: Path, ending: 
 
 @KINDS
 def test_a_load_vector_f_is_a_column_of_forces(tmp_path: Path, ending: str) -> None:
-    """n x 1 is no row of outputs; the report says what was done."""
+    """A column of n is no row of outputs; the report says what was done."""
     path = written(tmp_path / f"a{ending}", {**MODEL, "F": np.array([[0.0], [2.0], [0.5]])})
     model = load_model(path)
     np.testing.assert_array_equal(np.asarray(model.B).reshape(-1), [0.0, 2.0, 0.5])
@@ -178,7 +178,7 @@ def test_options_mean_the_same_for_every_kind_of_file(tmp_path: Path) -> None:
 def test_a_state_space_is_called_one(tmp_path: Path) -> None:
     """Its C is no damping."""
     np.savez(tmp_path / "a.npz", A=np.eye(2), B=np.eye(2), C=np.eye(2), D=np.eye(2))
-    with pytest.raises(FileFormatError, match="state space.*load_system"):
+    with pytest.raises(FileFormatError, match=r"state space.*load_system"):
         load_model(tmp_path / "a.npz")
 
 

@@ -73,7 +73,8 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     (('n1_u1', 'n2_u1'), [[4.0, -1.0], [-1.0, 3.0]])
     """
     columns = data_columns(content)
-    if ELSEWHERE.search(content) or len(BLOCK.findall(content)) > 1:
+    has_keywords = b"*" in content
+    if has_keywords and (ELSEWHERE.search(content) or len(BLOCK.findall(content)) > 1):
         msg = (
             "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read. Give the "
             "file with the numbers, or write each matrix into its own."
@@ -86,10 +87,10 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
         )
         raise FileFormatError(msg, path="")
     table = number_rows(content, columns, comment="*")
-    if LOAD.search(content) and columns == UNLABELLED:
+    if has_keywords and columns == UNLABELLED and LOAD.search(content):
         return _load(table, known_to(content))
     declared = _declared(content)
-    scale = _scale(content)
+    scale = _scale(content) if has_keywords else 1.0
     table[:, -1] *= scale
     raw = _labelled(table, declared) if columns == LABELLED else _unlabelled(table, declared, most_rows)
     notes = raw.notes if scale == 1.0 else (*raw.notes, f"entries are multiplied by SCALE FACTOR={scale:g}")

@@ -114,7 +114,10 @@ def _checked_sizes(fields: Sequence[bytes], count: int, room: tuple[int, int], l
         raise FileFormatError(msg, path="", line=line)
     sizes = [int(field) for field in fields]
     if not (sizes[0] and sizes[1]) or max(sizes[:2]) > max(room):
-        msg = f"a matrix of {sizes[0]} x {sizes[1]} in a file of {room[1]} bytes. It is damaged, or one of a model: give all files."
+        msg = (
+            f"a matrix of {sizes[0]} x {sizes[1]} in a file of {room[1]} bytes. It is damaged, or one of a model: give "
+            "all files."
+        )
         raise FileFormatError(msg, path="", line=line)
     return sizes
 

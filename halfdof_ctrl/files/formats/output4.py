@@ -26,20 +26,10 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import SINGLE, known_to
-from halfdof_ctrl.files.formats.raw_matrix import EPS, MOST_ROWS, Declared, RawMatrix, assembled
+from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of_form, meant_by_form
+from halfdof_ctrl.files.formats.raw_matrix import EPS, MOST_ROWS, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import Lines, fixed_width, printable
 
-SYMMETRIC_FORM, DIAGONAL_FORM, IDENTITY_FORM = 6, 3, 8
-PLAIN_FORMS = {1: "square", 2: "rectangular", 3: "diagonal", 6: "symmetric", 7: "row vector", 8: "identity"}
-OTHER_FORMS = {
-    4: "lower triangular factor",
-    5: "upper triangular factor",
-    9: "pseudo identity",
-    10: "Cholesky factor",
-    11: "trapezoidal",
-    13: "sparse lower triangular factor",
-    15: "sparse upper triangular factor",
-}  #: which are no matrices of a model
 COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
 MARK = 4  #: bytes of a record's length
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
@@ -92,45 +82,20 @@ class _Matrix:
             msg = f"{self.name} has entries that are not finite. {DAMAGED}"
             raise FileFormatError(msg, path="")
         values = numbers[0::2] + 1j * numbers[1::2] if self.per_value > 1 else numbers
-        i, j, values, shape = self._by_form(runs(rows - 1, counts), np.repeat(columns - 1, counts), values)
+        places = (runs(rows - 1, counts), np.repeat(columns - 1, counts))
+        i, j, values, shape = meant_by_form(self.form, self.shape, self.name, (*places, values))
         return assembled(
             i,
             j,
             values,
             shape,
-            declared=self._declared() if shape[0] == shape[1] else "unsaid",
+            declared=declared_by_form(self.form) if shape[0] == shape[1] else "unsaid",
             format=f"Nastran OUTPUT4 {words}, form {self.form}",
             title=self.name,
             named=True,
-            doubts=self._doubts(),
+            doubts=doubts_of_form(self.form),
             known_to=rounding,
         )
-
-    def _declared(self) -> Declared:
-        if self.form == SYMMETRIC_FORM:
-            return "symmetric"
-        return "unsaid" if self.form in PLAIN_FORMS else "unsymmetric"
-
-    def _doubts(self) -> tuple[str, ...]:
-        if self.form in PLAIN_FORMS:
-            return ()
-        return (f"has the form {self.form} ({OTHER_FORMS.get(self.form, 'unknown')}), which is no matrix of a model",)
-
-    def _by_form(
-        self, rows: npt.NDArray[Any], columns: npt.NDArray[Any], values: npt.NDArray[Any]
-    ) -> tuple[npt.NDArray[Any], npt.NDArray[Any], npt.NDArray[Any], tuple[int, int]]:
-        """Give rows, columns, values and shape as the form means them."""
-        n = max(self.shape)
-        if self.form == DIAGONAL_FORM and min(self.shape) == 1 and n > 1:
-            place = rows + columns  # one of them is zero
-            return place, place, values, (n, n)
-        if self.form == IDENTITY_FORM and not rows.size:
-            every = np.arange(n)
-            return every, every, np.ones(n), (n, n)
-        if self.form == IDENTITY_FORM and ((rows != columns) | (values != 1.0)).any():
-            msg = f"{self.name} says that it is an identity (form 8), but its entries are others. {DAMAGED}"
-            raise FileFormatError(msg, path="")
-        return rows, columns, values, self.shape
 
 
 def runs(starts: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:

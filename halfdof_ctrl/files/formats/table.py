@@ -152,7 +152,7 @@ def _numbers(plain: bytes, layout: _Layout) -> tuple[FloatArray, tuple[str, ...]
     """Parse the rows, and their names if they have some."""
     names: list[str] = []
     first = layout.skipped + 1
-    text = REMARK.sub(b"", plain)
+    text = _without_remarks(plain)
     if layout.labelled:
         rows = []
         for line in text.split(b"\n"):
@@ -172,7 +172,7 @@ def _numbers(plain: bytes, layout: _Layout) -> tuple[FloatArray, tuple[str, ...]
 def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | None:
     """Read the rows as places and values, if they can be that; None if they are a dense matrix."""
     rows, columns = table.shape
-    plain = REMARK.sub(b"", plain)
+    plain = _without_remarks(plain)
     places = table[:, :-1]
     if (places != np.rint(places)).any() or (columns == TRIPLET and (places < 0).any()):
         return None if rows == columns or columns != LABELLED else _refuse_places(table)
@@ -200,18 +200,22 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
 
 def _long_by_place(plain: bytes, columns: int, most_rows: int) -> RawMatrix:
     """Read rows that are too many for a square matrix, without parsing them twice."""
-    plain = REMARK.sub(b"", plain) if REMARK.search(plain) else plain
+    plain = _without_remarks(plain)
     head = number_rows(b"\n".join([line for _, line in _first_lines(plain)[:LONG]]), columns, comment="#")
     if (head[:, :-1] != np.rint(head[:, :-1])).any():
         return _refuse_places(head)
     first = head[0]
-    if (
-        columns == SIZES
-        and first[0] == first[1]
-        and first[2] == len([1 for line in plain.split(b"\n") if line.strip()]) - 1
-    ):
+    if columns == SIZES and first[0] == first[1] and first[2] == _count_rows(plain) - 1:
         raise _size_line_error(first, int(first[2]))
     return abaqus.read_abaqus(plain, most_rows)
+
+
+def _without_remarks(text: bytes) -> bytes:
+    return REMARK.sub(b"", text) if any(mark in text for mark in COMMENTS) else text
+
+
+def _count_rows(plain: bytes) -> int:
+    return len([line for line in plain.split(b"\n") if line.strip()])
 
 
 def _refuse_places(table: FloatArray) -> RawMatrix:
@@ -234,8 +238,8 @@ def _size_line_error(first: FloatArray, entries: int) -> FileFormatError:
     shown = " ".join([f"{size:g}" for size in first])
     msg = (
         f"the first line, {shown}, could be the sizes of a matrix with {entries} entries, or the entry of row "
-        f"{first[0]:g} and column {first[1]:g}. Take it away, or write the banner '%%MatrixMarket matrix coordinate real "
-        "general' before it."
+        f"{first[0]:g} and column {first[1]:g}. Take it away, or write the banner '%%MatrixMarket matrix coordinate "
+        "real general' before it."
     )
     return FileFormatError(msg, path="", line=1)
 
