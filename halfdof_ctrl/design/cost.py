@@ -12,13 +12,13 @@ from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 from halfdof_ctrl.reduction.dense.partition import DofPartition
-from halfdof_ctrl.reduction.choose import ExactReduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
 
 Weights: TypeAlias = Mapping[str, float] | None
 
 INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
-UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+UNSYMMETRIC_WEIGHTS = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,7 +93,7 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 
 
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Give the rows and weights of the kinetic and the elastic energy."""
+    """Return the rows and weights of the kinetic and the elastic energy."""
     model, part = reduction.model, reduction.partition
     if model.prescribed:
         msg = (
@@ -157,11 +157,11 @@ def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:
 
 
 def _smallest_eigenvalue(matrix: FloatArray) -> float:
-    """Give the smallest eigenvalue after scaling the diagonal to one."""
+    """Return the smallest eigenvalue after scaling the diagonal to one."""
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
     scale = np.where(scale > 0.0, scale, max(scale.max(initial=0.0), 1.0))
     return float(np.linalg.eigvalsh(matrix / scale / scale[:, None])[0])
 
 
 def _is_symmetric(matrix: FloatArray) -> bool:
-    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())
+    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC_WEIGHTS * np.abs(matrix).max())

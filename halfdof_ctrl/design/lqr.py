@@ -22,20 +22,21 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.errors import StabilizationError, WeightError
+from halfdof_ctrl.base.names import force_names, listed, motion_names
+from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
 from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.base.errors import StabilizationError, WeightError
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import force_names, listed, motion_names
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
-from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 
 UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
-MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
+AXIS_MARGIN = 10 * EPS  #: times N |A|: a pole nearer to the axis is not told from one on it
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -61,7 +62,7 @@ class StateFeedback:
         return self.reduction.states
 
     def as_mechss(self) -> SecondOrderModel:
-        """Give the closed loop as a second-order model, equation (13).
+        """Return the closed loop as a second-order model, equation (13).
 
         Its finite eigenvalues are the closed-loop poles, which checks the design without the reduction.
 
@@ -79,7 +80,7 @@ class StateFeedback:
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K
         partition = self.reduction.partition
-        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        maps = partition.state_maps()
         gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
         if len(gains) > DERIVATIVES:
             msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
@@ -104,7 +105,7 @@ class StateFeedback:
         lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
-        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
         return "\n".join([*lines, f"  closed-loop poles: {poles}"])
 
 
@@ -214,7 +215,7 @@ def _solved(reduction: ExactReduction, cost: Cost, method: Literal["scipy", "sly
         raise _unsolved_error(_eigenvalues(A)) from cause
     gain, riccati = np.asarray(gain) + 0.0, np.asarray(riccati)
     poles = _eigenvalues(A - B @ gain)
-    margin = MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
+    margin = AXIS_MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
     if not np.isfinite(gain).all() or (poles.real >= -margin).any():
         raise _unsolved_error(poles)
     return gain, riccati
@@ -234,8 +235,9 @@ def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None
         if mode is not None:
             force = _best_force(reduction, mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and no input reaches it, so that no feedback "
-                f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is not stable and no input reaches it, "
+                f"so that no feedback stabilizes it. Actuate it: a force on DOF {force} moves it most "
+                f"(input F_{force})."
             )
             raise StabilizationError(msg, eigenvalue=eigenvalue, quantity=f"F_{force}")
     for eigenvalue in _axis_eigenvalues(A - B @ cross, right_too=False):
@@ -243,8 +245,9 @@ def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None
         if mode is not None:
             kind, dof = _largest_motion(reduction, mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost does not see it, so that the "
-                f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is undamped and the cost does not "
+                "see it, so that the optimal feedback leaves it where it is. Weight it: it shows most in the "
+                f"{kind} of DOF {dof}."
             )
             raise StabilizationError(
                 msg, eigenvalue=eigenvalue, quantity=motion_names((dof,), int(kind == "velocity"))[0]
@@ -272,15 +275,16 @@ def _axis_eigenvalues(A: FloatArray, *, right_too: bool) -> list[complex]:
 def _unsolved_error(poles: ComplexArray) -> StabilizationError:
     """Make the refusal where the solver failed although a gain exists."""
     worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    place = complex_in_words(worst, pair=True)
     msg = (
-        f"The solver found no stabilizing gain, although one exists: a pole stays at {_in_words(worst)} rad/s. The "
+        f"The solver found no stabilizing gain, although one exists: a pole stays at {place} rad/s. The "
         "weights may differ by too many powers of ten; bring Q and R closer together."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
 
 
 def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
-    """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
+    """Return a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
     matrix, scale = balanced_states(A)
     shown = C * scale
     size = np.abs(shown).max(axis=1, keepdims=True)
@@ -308,10 +312,3 @@ def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str,
 
 def _eigenvalues(A: FloatArray) -> ComplexArray:
     return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
-
-
-def _in_words(value: complex) -> str:
-    """Write a pole with four digits, a pair as one."""
-    if abs(value.imag) <= UNREACHED * abs(value):
-        return f"{value.real:.4g}"
-    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"

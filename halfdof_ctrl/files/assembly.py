@@ -13,11 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, issparse
 
-from halfdof_ctrl.base.arrays import Matrix
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
+from halfdof_ctrl.base.arrays import EPS, Matrix
+from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.files.formats.raw_matrix import EPS, RawMatrix, Triangle, with_triangle
+from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, with_triangle
 from halfdof_ctrl.files.import_report import (
     PENALTY,
     ImportReport,
@@ -26,6 +26,7 @@ from halfdof_ctrl.files.import_report import (
     mass_per_direction,
     matrix_report,
 )
+from halfdof_ctrl.files.naming import naming_the_file
 from halfdof_ctrl.files.signals import aligned_signals, require_clear_letters, without_dofs
 from halfdof_ctrl.files.sources import Source, Sources, find_sources
 
@@ -134,7 +135,7 @@ def read_matrices(
 
 
 def _as_stored(raw: RawMatrix, matrix: csc_array) -> Matrix | csc_array:
-    """Give a matrix dense where its file holds it so: as it is there, or as it was completed."""
+    """Return a matrix dense where its file holds it so: as it is there, or as it was completed."""
     if raw.dense is None:
         return matrix
     unchanged = raw.matrix is matrix and not raw.completed
@@ -235,7 +236,7 @@ def _require_one_count(
 
 
 def _names_of(found: Sources, letter: str, raw: RawMatrix) -> tuple[str, ...] | None:
-    """Give the names of a matrix's rows: its own, those of the label file beside it, or of the only one that fits."""
+    """Return the names of a matrix's rows: its own, those of the label file beside it, or of the only one that fits."""
     if raw.dofs is not None:
         return raw.dofs
     path, n = found.matrices[letter].path, raw.matrix.shape[0]

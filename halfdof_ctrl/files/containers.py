@@ -13,12 +13,13 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
+from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.mat4 import is_mat4, mat4_variables
 from halfdof_ctrl.files.formats.mat5 import mat5_variables
 from halfdof_ctrl.files.formats.mat73 import is_mat73, mat73_variables
 from halfdof_ctrl.files.formats.npy import SPARSE_PARTS, is_npy, npy_variable, npz_variables
 from halfdof_ctrl.files.formats.variables import Variable
+from halfdof_ctrl.files.naming import naming_the_file
 
 PathLike: TypeAlias = str | os.PathLike[str]
 Content: TypeAlias = Mapping[str, Any]
@@ -28,7 +29,7 @@ ARRAY_ENDINGS = (*MATRIX_ENDINGS, ".npy")
 
 
 def ending(path: PathLike, known: Sequence[str]) -> str:
-    """Give the ending of a path in small letters, and refuse one that is not known."""
+    """Return the ending of a path in small letters, and refuse one that is not known."""
     suffix = Path(path).suffix.lower()
     if suffix not in known:
         msg = f"{path}: the ending {suffix or '(none)'} names no format for this. Use {', '.join(known)}."
@@ -66,7 +67,7 @@ def variables(content: bytes, *, is_archive: bool) -> list[Variable]:
 
 
 def texts(content: Content, key: str) -> list[str] | None:
-    """Give names, which are a text array in .npz and a list of texts from .mat."""
+    """Return names, which are a text array in .npz and a list of texts from .mat."""
     value = content.get(key)
     if value is None or isinstance(value, list):
         return value
@@ -79,7 +80,7 @@ def texts(content: Content, key: str) -> list[str] | None:
 
 
 def single_text(content: Content) -> str | None:
-    """Give the variable ``name``, None if it is empty or not there."""
+    """Return the variable ``name``, None if it is empty or not there."""
     found = texts(content, "name") or [""]
     if len(found) > 1:
         msg = f"name must be one text, but it has {len(found)}."
@@ -88,6 +89,6 @@ def single_text(content: Content) -> str | None:
 
 
 def sparse_parts(key: str, matrix: Any) -> dict[str, Any]:  # noqa: ANN401  # any sparse format
-    """Give the arrays by which an archive stores a sparse matrix."""
+    """Return the arrays by which an archive stores a sparse matrix."""
     columns = csc_array(matrix)
     return {f"{key}.{part}": np.asarray(getattr(columns, part)) for part in SPARSE_PARTS}

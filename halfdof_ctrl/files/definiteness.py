@@ -1,11 +1,11 @@
 """Inertia of a symmetric matrix: how many eigenvalues are positive, negative and zero.
 
 By Sylvester's law the signs of the eigenvalues stay when rows and columns are scaled alike, so the matrix gets a unit
-diagonal first, and zero means at most `ZERO` after that. The matrix falls into connected components. Small ones are
-solved densely. Of a large one, A, the triangular factors of ``A + ZERO I`` and ``A - ZERO I``, taken without
-exchanging rows, have as many negative pivots as there are eigenvalues below -ZERO and below ZERO. Where rows had to be
-exchanged, where the factors do not solve a system well, or where the component is too large for the time that a look
-at a file may take, the answer is that it is not known.
+diagonal first, and zero means at most z after that: `ZERO_VALUE`, or what the digits of a file leave unknown. The
+matrix falls into connected components. Small ones are solved densely. Of a large one, A, the triangular factors of
+``A + z I`` and ``A - z I``, taken without exchanging rows, have as many negative pivots as there are eigenvalues below
+-z and below z. Where rows had to be exchanged, where the factors do not solve a system well, or where the component is
+too large for the time that a look at a file may take, the answer is that it is not known.
 """
 
 from collections.abc import Iterator
@@ -18,14 +18,13 @@ from scipy.sparse import coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 
-EPS = 2.0**-52
-ZERO = 1e-12  #: of the matrix with unit diagonal
+ZERO_VALUE = 1e-12  #: of the matrix with unit diagonal
 DENSE_SIZE = 100  #: up to which a component is solved densely
 LARGEST_COMPONENT = 20_000  #: that is factorized
 BATCH = 2**22  #: entries of dense blocks that are held at once
-BACKWARD_ERROR = 1e-14  #: of a solution with the factors, above which their pivots are not believed
+UNBELIEVED_PIVOTS = 1e-14  #: of a solution with the factors, above which their pivots are not believed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,7 +35,7 @@ class Inertia:
     negative: int
     zero: int
     unknown: int  #: rows of the components that were not decided
-    zero_to: float = ZERO  #: size up to which an eigenvalue of the matrix with unit diagonal counts as zero
+    zero_to: float = ZERO_VALUE  #: size up to which an eigenvalue of the matrix with unit diagonal counts as zero
     lowest: float | None = None  #: lowest eigenvalue of the small components, with unit diagonal
 
     @property
@@ -85,7 +84,7 @@ def inertia(matrix: csc_array, largest: int = LARGEST_COMPONENT, known_to: float
     order = np.argsort(label, kind="stable")
     first = np.cumsum(sizes) - sizes
     scaled = csc_array(csc_array(_at_unit_diagonal(symmetric)[order])[:, order])
-    zero = max(ZERO, known_to * float(abs(scaled).sum(axis=0).max())) if known_to > EPS else ZERO
+    zero = max(ZERO_VALUE, known_to * float(abs(scaled).sum(axis=0).max())) if known_to > EPS else ZERO_VALUE
     lowest = np.inf
     signs = np.zeros(3, dtype=np.int64)
     for values in _small_spectra(scaled.tocoo(), label[order], first, sizes):
@@ -121,7 +120,7 @@ def _at_unit_diagonal(symmetric: csc_array) -> csc_array:
 def _small_spectra(
     entries: coo_array, label: npt.NDArray[Any], first: npt.NDArray[Any], sizes: npt.NDArray[Any]
 ) -> Iterator[FloatArray]:
-    """Give the eigenvalues of the small components, as many of one size as fit into memory at once."""
+    """Return the eigenvalues of the small components, as many of one size as fit into memory at once."""
     owner = label[entries.row]
     by_owner = np.argsort(owner, kind="stable")
     row, column, value = (part[by_owner] for part in (entries.row, entries.col, entries.data))
@@ -159,6 +158,6 @@ def _negative_pivots(shifted: csc_array) -> int | None:
     probe = np.cos(np.arange(shifted.shape[0]))
     solution = factors.solve(probe)
     size = float(abs(shifted).sum(axis=0).max() * np.abs(solution).max() + np.abs(probe).max())
-    if not np.abs(probe - shifted @ solution).max() <= BACKWARD_ERROR * size:
+    if not np.abs(probe - shifted @ solution).max() <= UNBELIEVED_PIVOTS * size:
         return None
     return int((factors.U.diagonal() < 0.0).sum())

@@ -55,7 +55,7 @@ def models_in(folder: Path) -> list[list[Path]]:
 
 
 def _only_names_rows(path: Path, others: Sequence[Path]) -> bool:
-    """Tell whether a file names rows: a mapping, or the punch file beside an OUTPUT4 file."""
+    """Return whether a file names rows: a mapping, or the punch file beside an OUTPUT4 file."""
     suffix = path.suffix.lower()
     return suffix in LABELS or (suffix == ".pch" and path.with_suffix(".op4") in others)
 
@@ -98,7 +98,7 @@ def _in_folder(folder: Path) -> list[Path]:
 
 
 def _with_matrices(files: Sequence[Path]) -> list[Path]:
-    """Give the files of programs, and tables and arrays under the name of a matrix that these do not have."""
+    """Return the files of programs, and tables and arrays under the name of a matrix that these do not have."""
     found = [path for path in files if path.suffix.lower() in ENDINGS]
     roles = roles_in([path for path in files if path.suffix.lower() in (*ENDINGS, *TABLES, *ARRAY_ENDINGS)])
     if any(path.suffix.lower() in SEVERAL for path in found):
@@ -112,7 +112,7 @@ def _with_matrices(files: Sequence[Path]) -> list[Path]:
 
 
 def _holds_stiffness(path: Path) -> bool:
-    """Tell whether a file with named variables has one called K that may be a matrix, and so is no state space."""
+    """Return whether a file with named variables has one called K that may be a matrix, and so is no state space."""
     if path.suffix.lower() not in ARRAY_ENDINGS:
         return False
     try:

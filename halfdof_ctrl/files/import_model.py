@@ -10,20 +10,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import (
     FileFormatError,
     ImportedModelWarning,
     ParameterError,
     callers_level,
-    naming_the_file,
 )
 from halfdof_ctrl.base.names import checked_names
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
 from halfdof_ctrl.files.containers import PathLike, single_text, texts
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.files.formats.raw_matrix import EPS, Triangle
+from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_report import ImportReport
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
 FACTORIZE_NONE = 0  #: loading a model does not wait for ranks
@@ -76,7 +78,7 @@ def _checked(
     remove_fixed: object,
     matrices: object,
 ) -> list[Path] | dict[str, Path]:
-    """Give paths, and refuse options that are none."""
+    """Return paths, and refuse options that are none."""
     if triangle is not None and triangle not in TRIANGLES:
         msg = f"triangle={triangle!r}, but it is 'lower', 'upper' or None: what files store of a symmetric matrix."
         raise ParameterError(msg, parameter="triangle", value=triangle)

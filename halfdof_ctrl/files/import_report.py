@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.definiteness import Inertia, inertia
 from halfdof_ctrl.files.formats.digits import digits_in_words
 from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
-from halfdof_ctrl.files.formats.raw_matrix import EPS, Storage
+from halfdof_ctrl.files.formats.raw_matrix import Storage
 
 SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
 PENALTY = 1e35  #: a stiffness from here on is a boundary condition; Abaqus writes 1e36
@@ -124,7 +125,7 @@ class ImportReport:
         return tuple(found)
 
     def __repr__(self) -> str:
-        """Give the table."""
+        """Return the table."""
         names = "named by node and component" if self.labelled else "without names in the files"
         lines = [f"{type(self).__name__}: {self.n_dofs} DOFs, {names}", *_table(self.matrices)]
         lines += [f"  {text}" for text in self.signals]

@@ -20,13 +20,13 @@ from pathlib import Path
 
 from halfdof_ctrl.files.formats import calculix
 
-WORDS = {
+ROLE_WORDS = {
     "stif": "K", "stiff": "K", "stiffness": "K", "k": "K",
     "mass": "M", "m": "M",
     "dmpv": "C", "damp": "C", "damping": "C", "c": "C",
     "dmps": "S",
 }  # fmt: skip
-_ANY = "|".join(sorted(WORDS, key=len, reverse=True))
+_ANY = "|".join(sorted(ROLE_WORDS, key=len, reverse=True))
 PATTERNS = tuple(
     re.compile(pattern, re.IGNORECASE)
     for pattern in (
@@ -36,7 +36,7 @@ PATTERNS = tuple(
         rf"(?P<before>)(?P<word>{_ANY})(?P<after>[_\-. ].*)",
     )
 )
-LONG_WORDS = tuple(word for word in sorted(WORDS, key=len, reverse=True) if len(word) > 1)
+LONG_WORDS = tuple(word for word in sorted(ROLE_WORDS, key=len, reverse=True) if len(word) > 1)
 LABELS = {".op4": ".pch", ".sti": ".dof", ".mas": ".dof"}  #: ending of the file with the names of rows; else .mapping
 SETS = "gg|aa|ff|ll|nn|oo|tt|pp|dd|hh|jj|xx"
 NASTRAN = re.compile(rf"(?P<kind>k4|k2?|m2?|b2?)({SETS})x?\d*", re.IGNORECASE)
@@ -87,13 +87,13 @@ def roles_in(files: Iterable[Path]) -> dict[Path, FileRole]:
 
 
 def _plain_roles(path: Path) -> Iterator[FileRole]:
-    """Give what a name says by itself."""
+    """Return what a name says by itself."""
     if path.suffix.lower() in calculix.LETTERS:
         yield FileRole(calculix.LETTERS[path.suffix.lower()], (path.stem.lower(), ""))
     for pattern in PATTERNS:
         match = pattern.fullmatch(path.stem)
         if match is not None:
-            yield FileRole(WORDS[match["word"].lower()], (match["before"].lower(), match["after"].lower()))
+            yield FileRole(ROLE_WORDS[match["word"].lower()], (match["before"].lower(), match["after"].lower()))
             break
     name = path.stem
     for start, word in _words_in(name):
@@ -103,19 +103,19 @@ def _plain_roles(path: Path) -> Iterator[FileRole]:
         begins = not before[-1:].isalpha() or (capital and before[-1:].islower())
         ends = not after[:1].isalpha() or (after[:1].isupper() and (len(word) > 1 or after[1:2].islower()))
         if begins and ends and (len(word) > 1 or capital):
-            yield FileRole(WORDS[word.lower()], (before.lower(), after.lower()))
+            yield FileRole(ROLE_WORDS[word.lower()], (before.lower(), after.lower()))
 
 
 def _loose_roles(path: Path) -> Iterator[FileRole]:
-    """Give what a name says only beside a sibling: a word within others."""
+    """Return what a name says only beside a sibling: a word within others."""
     for start, word in _words_in(path.stem):
         if len(word) > 1:
             before, after = path.stem[:start], path.stem[start + len(word) :]
-            yield FileRole(WORDS[word.lower()], (before.lower(), after.lower()))
+            yield FileRole(ROLE_WORDS[word.lower()], (before.lower(), after.lower()))
 
 
 def _words_in(name: str) -> Iterator[tuple[int, str]]:
-    """Give the places of words for matrices in a name, long ones first."""
+    """Return the places of words for matrices in a name, long ones first."""
     lower = name.lower()
     for word in (*LONG_WORDS, "k", "m", "c"):
         for match in re.finditer(word, lower):

@@ -50,16 +50,16 @@ def require_clear_letters(
         other = "gyroscopic forces (add it to C)" if damping_is_said else "the damping"
         name = source.raw.title or letter
         argument = f"matrices={{'C': {name!r}}}" if source.raw.named else f"{{'C': {source.path.name!r}, ...}}"
+        choices = f"matrices={{{letter!r}: {name!r}}} for the other, or matrices={{{letter!r}: None}} to leave it out"
         msg = (
             f"{source.path}: {letter} in {source.path.name} is {n} x {n}, as large as the stiffness, and could be "
-            f"{other} or {MEANING[letter]}. Say {argument} for damping, matrices={{{letter!r}: {name!r}}} for the other, "
-            f"or matrices={{{letter!r}: None}} to leave it out."
+            f"{other} or {MEANING[letter]}. Say {argument} for damping, {choices}."
         )
         raise FileFormatError(msg, path=str(source.path))
 
 
 def aligned_signals(found: Sources, names: Sequence[str], *, labelled: bool) -> tuple[dict[str, Any], list[str]]:
-    """Give the signals on the model's DOFs, and what was done to them.
+    """Return the signals on the model's DOFs, and what was done to them.
 
     Raises
     ------

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
+from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
 from halfdof_ctrl.files.folders import all_files
@@ -21,11 +21,12 @@ from halfdof_ctrl.files.formats.npy import is_npy, is_npz
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, most_rows
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.formats.variables import Variable
+from halfdof_ctrl.files.naming import naming_the_file
 from halfdof_ctrl.files.roles import FileRole, matrices_of_labels, nastran_letter, roles_in, with_labels
 from halfdof_ctrl.files.workspace import SIGNALS, Workspace, listing, read_workspace
 
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
-LETTERS = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
+FEM_MATRICES = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
 LABEL_ENDINGS = (".mapping", ".dof")
 Titles = Mapping[str, str | None]
 
@@ -108,10 +109,10 @@ def find_sources(given: Sequence[Path] | Mapping[str, Path], titles: Titles) -> 
 
 
 def _require_letters(letters: Sequence[str]) -> None:
-    unknown = [str(letter) for letter in letters if letter not in (*LETTERS, *SIGNALS)]
+    unknown = [str(letter) for letter in letters if letter not in (*FEM_MATRICES, *SIGNALS)]
     if unknown:
         msg = (
-            f"{listed(unknown)} is no matrix of a model. Known: {', '.join(LETTERS)} (structural damping) and "
+            f"{listed(unknown)} is no matrix of a model. Known: {', '.join(FEM_MATRICES)} (structural damping) and "
             f"{', '.join(SIGNALS)}."
         )
         raise FileFormatError(msg, path="")
@@ -133,7 +134,7 @@ class _Reading:
     def is_whole(self) -> bool:
         """Whether the files hold more than one matrix that says what it is, so that no siblings are looked for."""
         raws = [raw for found in self.raws.values() for raw in found]
-        return len({raw.letter for raw in raws if raw.named and raw.letter in LETTERS}) > 1 or any(
+        return len({raw.letter for raw in raws if raw.named and raw.letter in FEM_MATRICES}) > 1 or any(
             raw.format.startswith("Nastran") for raw in raws
         )
 
@@ -190,7 +191,7 @@ class _Reading:
         chosen = _chosen(sources, self.told, self.titles, self.left)
         taken = {id(source) for source in chosen.values()}
         unused = tuple([source for source in sources if id(source) not in taken])
-        square = {letter: source for letter, source in chosen.items() if letter in LETTERS}
+        square = {letter: source for letter, source in chosen.items() if letter in FEM_MATRICES}
         signals = {letter: source for letter, source in chosen.items() if letter in SIGNALS}
         found = Sources(
             tuple(self.files),
@@ -290,7 +291,7 @@ def _chosen(
 ) -> dict[str, Source]:
     """Find the one matrix for each letter."""
     chosen = {}
-    for letter in (*LETTERS, *SIGNALS):
+    for letter in (*FEM_MATRICES, *SIGNALS):
         if letter in titles and titles[letter] is None:
             continue
         candidates = _candidates(letter, sources, told, titles, left)
@@ -315,7 +316,7 @@ def _candidates(
     titles: Titles,
     left: Mapping[Path, tuple[Variable, ...]],
 ) -> list[Source]:
-    """Give the matrices that a letter may stand for, by the user's word or by their own."""
+    """Return the matrices that a letter may stand for, by the user's word or by their own."""
     own = [source for source in sources if letter not in told or source.path == told[letter]]
     title = titles.get(letter)
     if title is not None:
@@ -348,5 +349,5 @@ def _candidates(
 
 
 def _is_placeholder(source: Source) -> bool:
-    """Tell whether it is the 1 x 1 matrix of zero that Nastran writes for a matrix that there is not."""
+    """Return whether it is the 1 x 1 matrix of zero that Nastran writes for a matrix that there is not."""
     return source.raw.format.startswith("Nastran") and source.raw.matrix.shape == (1, 1) and not source.raw.matrix.nnz

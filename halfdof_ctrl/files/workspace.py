@@ -14,12 +14,12 @@ from typing import Any, cast
 import numpy as np
 from scipy.sparse import csc_array, issparse
 
-from halfdof_ctrl.base.arrays import checked_matrix
+from halfdof_ctrl.base.arrays import EPS, checked_matrix
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
 from halfdof_ctrl.files.formats.digits import SINGLE
-from halfdof_ctrl.files.formats.raw_matrix import EPS, RawMatrix, storage
+from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
 from halfdof_ctrl.files.formats.variables import Variable
 
 SQUARE = ("M", "C", "K", "S")
@@ -127,7 +127,7 @@ def _called(title: str, found: Sequence[Variable]) -> Variable | None:
 
 
 def _with_parts(found: Sequence[Variable]) -> Iterator[Variable]:
-    """Give variables, and what is in structs and cell arrays."""
+    """Return variables, and what is in structs and cell arrays."""
     for variable in found:
         yield variable
         if variable.kind in {"struct", "cell"}:

@@ -10,14 +10,14 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.sparse_arrays import is_sparse
+from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
-BACKWARD_ERROR = 64 * np.finfo(float).eps  #: componentwise; above it a solution is corrected once
 
 
 def quadratic_transfer(
@@ -90,14 +90,14 @@ def quadratic_rounding(
             y = np.swapaxes(_solution_size(np.swapaxes(matrix, 1, 2), np.swapaxes(output, 1, 2)), 1, 2)
             bound = y @ (size_P @ x + size_B) + size_F @ x + size_D
         bounds[:, :, start : start + batch] = np.moveaxis(np.nan_to_num(bound, nan=np.inf), 0, 2)
-    return np.asarray(np.finfo(float).eps * bounds)
+    return np.asarray(EPS * bounds)
 
 
 def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
-    """Give the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
+    """Return the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
     columns = _equilibrating_powers(P)[1]
     size = np.abs(_solved(P, B)) / np.swapaxes(columns, 1, 2)
-    return np.asarray((size + np.finfo(float).eps * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
+    return np.asarray((size + EPS * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
 
 
 def _sizes(coefficients: Coefficients, points: ComplexArray) -> FloatArray:
@@ -146,7 +146,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
     solution = _solve_each(scaled, right)
     residual = right - scaled @ solution
     size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
-    coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
+    coarse = (np.abs(residual) > CORRECTED_ABOVE * size).any(axis=(1, 2))
     if coarse.any():
         solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
     solution *= np.swapaxes(columns, 1, 2)
@@ -154,7 +154,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
 
 
 def _equilibrating_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
+    """Return powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
     rows = powers_of_two(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
     return rows, powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
 

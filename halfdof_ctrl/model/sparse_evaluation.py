@@ -9,7 +9,7 @@ Solved is for the inputs, or with the transpose for the outputs, whichever are f
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,24 +19,15 @@ from scipy.sparse.linalg import SuperLU, splu
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.base.sparse_arrays import (
-    SparseMatrix,
-    as_sparse,
-    column_of_entries,
-    largest_by_row_and_column,
-    times,
-)
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
-Pivoting: TypeAlias = tuple[Literal["MMD_AT_PLUS_A", "COLAMD"], float]  #: order, least pivot over the column's largest
 
-WIDTH = 8  #: right-hand sides worked at a time
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
-REFINED = 64 * np.finfo(float).eps  #: componentwise backward error above which a solution is corrected once
-UNSAFE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
-SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
-PIVOTINGS: tuple[Pivoting, ...] = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))
+STRICTER_PIVOTS_ABOVE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
 
 
 @limited_threads(1)
@@ -113,20 +104,20 @@ class SparseTransfer:
                 except RuntimeError:  # exactly singular
                     self.growth = np.inf
                     break
-                if backward_error <= UNSAFE or way == len(self.pivotings) - 1:
+                if backward_error <= STRICTER_PIVOTS_ABOVE or way == len(self.pivotings) - 1:
                     value = np.asarray(motion + D.toarray())
                     break
         value[~np.isfinite(value)] = complex(np.inf, np.nan)
         return np.asarray(value.T if self.turned else value)
 
     def _times_solution(self, F: SparseMatrix, B: SparseMatrix, s: complex, way: int) -> tuple[ComplexArray, float]:
-        """Give ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
+        """Return ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
         factors = self._factorized(s, way)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
-        for start in range(0, B.shape[1], WIDTH):
-            solution, backward_error = factors.solve(B[:, start : start + WIDTH].toarray())
-            product[:, start : start + WIDTH] = times(F, solution)
+        for start in range(0, B.shape[1], COLUMNS_AT_A_TIME):
+            solution, backward_error = factors.solve(B[:, start : start + COLUMNS_AT_A_TIME].toarray())
+            product[:, start : start + COLUMNS_AT_A_TIME] = times(F, solution)
             worst = max(worst, backward_error)
         return product, worst
 
@@ -237,12 +228,12 @@ class PointFactors:
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
 
     def solve(self, right: Matrix) -> tuple[ComplexArray, float]:
-        """Give ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
+        """Return ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
         rows, columns = self.pencil.rows, self.pencil.columns
         scaled: ComplexArray = np.asarray((right if rows is None else right[rows]) * self.down, dtype=np.complex128)
         solution: Any = self.lu.solve(scaled)
         residual, backward_error = self._residual(scaled, solution)
-        if backward_error > REFINED:
+        if backward_error > CORRECTED_ABOVE:
             solution += self.lu.solve(residual)
             _, backward_error = self._residual(scaled, solution)
         solution *= self.across
@@ -253,7 +244,7 @@ class PointFactors:
         return back, backward_error
 
     def growth(self) -> float:
-        """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
+        """Return the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
         right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
         size = float(np.abs(self.lu.solve(right)).max())
         return size if np.isfinite(size) else np.inf
@@ -266,7 +257,7 @@ class PointFactors:
 
 
 def _polynomial(coefficients: Sequence[SparseMatrix], s: complex) -> SparseMatrix:
-    """Give the value of a matrix polynomial, skipping zero coefficients."""
+    """Return the value of a matrix polynomial, skipping zero coefficients."""
     value = csc_array(coefficients[0])
     for power, part in enumerate(coefficients[1:], start=1):
         if part.nnz:

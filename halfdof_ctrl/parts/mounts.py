@@ -3,7 +3,8 @@
 import math
 
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
 def hydromount(

@@ -156,7 +156,7 @@ def main(largest: int) -> None:
             with tempfile.TemporaryDirectory() as folder:
                 paths = write(Path(folder), n)
                 alone = sum(seconds(lambda path=path: numbers_alone(path)) for path in paths)
-                spent = seconds(lambda: hd.load_model(paths[0]))
+                spent = seconds(lambda first=paths[0]: hd.load_model(first))
             growth = f"{spent / before:8.2f}" if before else " " * 8
             print(f"{name:26s}{n:10d}{spent:16.2f}{growth}{spent / alone:18.1f}", flush=True)
             before = spent

@@ -31,7 +31,7 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
-TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
+MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
 BLOCK = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
 SCALE = re.compile(rb"^\*\s*matrix[^\n]*\bscale\s+factor\s*=\s*([^\s,]+)", re.IGNORECASE | re.MULTILINE)
 ELSEWHERE = re.compile(rb"^\*\s*matrix[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
@@ -99,7 +99,7 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
 
 
 def _declared(content: bytes) -> Declared:
-    found = TYPE.search(content[:65536])
+    found = MATRIX_TYPE.search(content[:65536])
     if found is None:
         return "unsaid"
     return "symmetric" if found[1].lower() == b"symmetric" else "unsymmetric"

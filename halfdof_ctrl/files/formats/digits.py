@@ -7,7 +7,7 @@ digit. A file in which hardly any number uses as many digits as the longest one 
 
 import re
 
-from halfdof_ctrl.files.formats.raw_matrix import EPS
+from halfdof_ctrl.base.arrays import EPS
 
 SAMPLE = 2**17  #: bytes at the start and at the end that are looked at; a file has one format
 NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
@@ -43,7 +43,7 @@ def digits_of(content: bytes) -> int | None:
 
 
 def known_to(content: bytes) -> float:
-    """Give the relative rounding of the numbers of a text: half a unit in the last digit of 1, at least `EPS`."""
+    """Return the relative rounding of the numbers of a text: half a unit in the last digit of 1, at least `EPS`."""
     digits = digits_of(content)
     return EPS if digits is None else max(EPS, 0.5 * 10.0 ** (1 - digits))
 

@@ -28,7 +28,7 @@ HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
 PEEK = 2**12  #: bytes that hold the name of a variable
 MATRIX, COMPRESSED = 14, 15
-NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
 CELL, STRUCT, CHAR, SPARSE, OPAQUE = 1, 2, 4, 5, 17
 MOST_PARTS = 1000  #: of a struct or cell array that are listed
@@ -161,7 +161,7 @@ class _Bytes:
         return part
 
     def element(self) -> tuple[int, bytes]:
-        """Give type and data of the next element."""
+        """Return type and data of the next element."""
         tag = self.take(TAG)
         kind, length = np.frombuffer(tag, self.order + "u4").tolist()
         if kind >> 16:
@@ -172,14 +172,14 @@ class _Bytes:
         return kind, data
 
     def numbers(self) -> npt.NDArray[Any]:
-        """Give the next element as numbers."""
+        """Return the next element as numbers."""
         return self.as_numbers(*self.element())
 
     def as_numbers(self, kind: int, data: bytes) -> npt.NDArray[Any]:
-        if kind not in NUMBERS:
+        if kind not in NUMBER_TYPES:
             msg = f"an element of type {kind} where numbers should be"
             raise ValueError(msg)
-        return np.frombuffer(data, self.order + NUMBERS[kind])
+        return np.frombuffer(data, self.order + NUMBER_TYPES[kind])
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,7 @@ def doubts_of_form(form: int) -> tuple[str, ...]:
 def meant_by_form(
     form: int, shape: tuple[int, int], name: str, entries: tuple[Array, Array, Array]
 ) -> tuple[Array, Array, Array, tuple[int, int]]:
-    """Give rows, columns, values and shape as the form means them.
+    """Return rows, columns, values and shape as the form means them.
 
     Raises
     ------

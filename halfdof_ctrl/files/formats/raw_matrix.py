@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import FileFormatError
 
 Declared: TypeAlias = Literal["symmetric", "skew-symmetric", "general", "unsymmetric", "unsaid"]
@@ -21,9 +22,7 @@ IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 
 MOST_ROWS = 20_000_000  #: index arrays of 160 MB; a header that says more than this and the file's length is damaged
 FREE_ROWS = 10_000  #: rows that a file may say it has, whatever its length
-EPS = 2.0**-52
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
-MATRIX_DIMENSIONS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -107,12 +106,12 @@ def assembled(
 
 
 def most_rows(length: int) -> int:
-    """Give how many rows files of so many bytes may have: a row without a byte carries no entry in any matrix."""
+    """Return how many rows files of so many bytes may have: a row without a byte carries no entry in any matrix."""
     return min(MOST_ROWS, max(FREE_ROWS, length))
 
 
 def storage(matrix: csc_array) -> Storage:
-    """Tell where the off-diagonal entries of a matrix are.
+    """Return where the off-diagonal entries of a matrix are.
 
     "either" means in both triangles, but never both entries of a pair.
     """

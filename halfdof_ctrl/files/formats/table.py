@@ -47,7 +47,7 @@ class _Layout:
 
 
 def is_table(content: bytes) -> bool:
-    """Tell whether the first line that is no comment, or the one after a line of titles, is made of numbers."""
+    """Return whether the first line that is no comment, or the one after a line of titles, is made of numbers."""
     if b"\0" in content[:HEAD]:
         return False
     lines = [fields for _, fields in _first_lines(content.removeprefix(BOM))][:2]
@@ -96,7 +96,7 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
 
 
 def _first_lines(content: bytes) -> list[tuple[int, bytes]]:
-    """Give the first lines that are neither empty nor comments, with their numbers."""
+    """Return the first lines that are neither empty nor comments, with their numbers."""
     lines = enumerate(content[:HEAD].split(b"\n"))
     return [
         (number, line.rstrip(b"\r"))
@@ -143,7 +143,7 @@ def _layout(content: bytes) -> _Layout:
 
 
 def _plain(content: bytes, layout: _Layout) -> bytes:
-    """Give the rows with decimal points, without the lines before them."""
+    """Return the rows with decimal points, without the lines before them."""
     text = content.split(b"\n", layout.skipped)[-1] if layout.skipped else content
     return DECIMAL_COMMA.sub(b".", text) if layout.decimal_comma else text
 
@@ -249,7 +249,7 @@ def _asymmetry(table: FloatArray) -> float:
 
 
 def _written_as_places(plain: bytes, columns: int) -> bool:
-    """Tell whether all but the last number of each line are written without a point, and the last one with it."""
+    """Return whether all but the last number of each line are written without a point, and the last one with it."""
     lines = [_cut(line, *_separators(line)) for _, line in _first_lines(plain)]
     return all(
         len(fields) == columns
@@ -286,12 +286,12 @@ def _dense(table: FloatArray, names: tuple[str, ...] | None, layout: _Layout, ro
 
 
 def _counts(row: FloatArray) -> bool:
-    """Tell whether a row is 0, 1, 2, ... or 1, 2, 3, ..."""
+    """Return whether a row is 0, 1, 2, ... or 1, 2, 3, ..."""
     return bool((np.diff(row) == 1.0).all()) and row[0] in {0.0, 1.0}
 
 
 def _names(rows: Sequence[str] | None, titles: tuple[str, ...], count: int) -> tuple[str, ...] | None:
-    """Give the names of rows, which must be those of the columns where these have some too."""
+    """Return the names of rows, which must be those of the columns where these have some too."""
     if rows is None or len(rows) != count or all(name.isdigit() for name in rows):
         return None
     columns = titles[len(titles) - count :]

@@ -14,7 +14,8 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 
-BLOCK = 2**25  #: bytes that are parsed at once
+LONGEST_LINE = 1024  #: characters of a line of fixed fields; Fortran's own limit is 132
+TEXT_BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
 NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
 TAIL = 4096  #: bytes at the end of a text that are looked at
@@ -73,7 +74,7 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
 
 
 def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Give parsed numbers as integers, and refuse fractions.
+    """Return parsed numbers as integers, and refuse fractions.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], 
 
 
 def printable(text: bytes) -> str:
-    r"""Give a name or title of a file for people to read, whatever damage did to it.
+    r"""Return a name or title of a file for people to read, whatever damage did to it.
 
     >>> printable(b"KAAX \x00\n")
     'KAAX'
@@ -101,7 +102,7 @@ def printable(text: bytes) -> str:
 
 
 def is_cut_short(content: bytes) -> bool:
-    r"""Tell whether the last number of a text without a last line end has lost digits for sure.
+    r"""Return whether the last number of a text without a last line end has lost digits for sure.
 
     So it is where the numbers that end the lines before it all have one length and it has less.
 
@@ -166,7 +167,7 @@ class Lines:
         return int(self.ends.size)
 
     def __getitem__(self, number: int) -> bytes:
-        """Give a line, counted from zero, without its end."""
+        """Return a line, counted from zero, without its end."""
         return self.content[self._start(number) : int(self.ends[number])].rstrip(b"\r")
 
     def _start(self, number: int) -> int:
@@ -212,7 +213,7 @@ def _blocks(content: bytes, first_line: int) -> Iterator[tuple[bytes, int]]:
     """Cut the content at line ends, with the number of each block's first line."""
     start, line = 0, first_line
     while start < len(content):
-        stop = content.find(b"\n", min(start + BLOCK, len(content)))
+        stop = content.find(b"\n", min(start + TEXT_BLOCK, len(content)))
         stop = len(content) if stop < 0 else stop + 1
         block = content[start:stop]
         yield block, line

@@ -53,7 +53,7 @@ def _has_matrix(parts: Callable[[], list[Variable]]) -> bool:
 
 
 def most_unpacked(length: int) -> int:
-    """Give how many bytes may be unpacked from so many.
+    """Return how many bytes may be unpacked from so many.
 
     >>> most_unpacked(1) == FREE_BYTES, most_unpacked(10**9)
     (True, 10000000000)
