@@ -68,11 +68,17 @@ class Sources:
     @property
     def holds(self) -> str:
         """What the files with named variables hold beside what is used, with the argument that says which is which."""
-        used = [source for source in (*self.matrices.values(), *self.signals.values()) if source.raw.named]
-        shown = [f"{source.name} ({' x '.join(map(str, source.raw.matrix.shape))})" for source in used]
-        also = f"besides {listed(shown)} " if used else ""
-        every = [variable for variables in self.left.values() for variable in variables]
+        said = [source for source in self.matrices.values() if source.raw.named]
+        shown = [f"{source.name} ({' x '.join(map(str, source.raw.matrix.shape))})" for source in said]
+        also = f"besides {listed(shown)} " if shown else ""
+        signals = [_as_variable(source.raw) for source in self.signals.values() if source.raw.named]
+        every = [*signals, *[variable for variables in self.left.values() for variable in variables]]
         return f"{also}{listing(every)}" if every else ""
+
+
+def _as_variable(raw: RawMatrix) -> Variable:
+    rows, columns = raw.matrix.shape
+    return Variable(name=raw.title, kind="matrix", shape=(rows, columns), read=lambda: raw.matrix)
 
 
 def find_sources(given: Sequence[Path] | Mapping[str, Path], titles: Titles) -> Sources:

@@ -11,7 +11,7 @@ from halfdof_ctrl.base.arrays import EPS
 
 SAMPLE = 2**17  #: bytes at the start and at the end that are looked at; a file has one format
 NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
-FULL = 17  #: digits that tell every float64 apart
+FULL = 16  #: digits from which numbers are as good as float64
 SURE = 6  #: digits from which few numbers of full length tell a format
 FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
 SHORT = 4  #: digits of the shortest format that is believed,

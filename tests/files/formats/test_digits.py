@@ -12,7 +12,7 @@ from halfdof_ctrl.files.definiteness import inertia
 from halfdof_ctrl.files.formats.digits import digits_in_words, digits_of, known_to
 
 
-@pytest.mark.parametrize("digits", range(6, 15))
+@pytest.mark.parametrize("digits", range(6, 16))
 @given(seed=st.integers(0, 1000))
 def test_the_digits_of_random_numbers_are_found(digits: int, seed: int) -> None:
     """In fixed and in short notation, as C and Fortran write them."""
