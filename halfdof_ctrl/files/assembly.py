@@ -86,7 +86,7 @@ def read_matrices(
         A file is not there or cannot be read.
     """
     found = find_sources(given, matrices or {})
-    raws = {letter: _completed(source, triangle) for letter, source in found.matrices.items()}
+    raws = {letter: _completed(letter, source, triangle) for letter, source in found.matrices.items()}
     square, dofs, notes = _aligned(found, raws)
     names = dofs or tuple([f"q{index}" for index in range(next(iter(square.values())).shape[0])])
     require_clear_letters(found, len(names), matrices or {}, given)
@@ -168,14 +168,14 @@ def _similar(found: Sources, raws: Mapping[str, RawMatrix], declined: Sequence[s
     return tuple(names) if size[0] > 1 else ()
 
 
-def _completed(source: Source, triangle: Triangle | None) -> RawMatrix:
+def _completed(letter: str, source: Source, triangle: Triangle | None) -> RawMatrix:
     raw = source.raw
     if raw.matrix.shape[0] != raw.matrix.shape[1]:
         size = f"{raw.matrix.shape[0]} x {raw.matrix.shape[1]}"
         what = source.raw.title if source.raw.named else source.path.name
         msg = (
             f"{source.path}: {what} is {size}, but the matrices of a model must be square. If it is something else, "
-            "name the right one: matrices={'K': name}, or {'K': path}."
+            f"name the right one: matrices={{{letter!r}: name}}, or {{{letter!r}: path}}."
         )
         raise FileFormatError(msg, path=str(source.path))
     if triangle is None:
@@ -259,7 +259,11 @@ def _names_of(found: Sources, letter: str, raw: RawMatrix) -> tuple[str, ...] | 
 def _sizes_differ(found: Sources, raws: Mapping[str, RawMatrix]) -> FileFormatError:
     path = next(iter(found.matrices.values())).path
     sizes = listed([f"{letter} {raw.matrix.shape[0]} x {raw.matrix.shape[1]}" for letter, raw in raws.items()])
-    msg = f"{path}: the matrices differ in size ({sizes}), and there are no labels for all. Write them from one run."
+    also = f" Or one of them is something else; {found.holds}." if found.holds else ""
+    msg = (
+        f"{path}: the matrices differ in size ({sizes}), and there are no labels for all. Write them from one run."
+        f"{also}"
+    )
     return FileFormatError(msg, path=str(path))
 
 

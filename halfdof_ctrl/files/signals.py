@@ -96,7 +96,7 @@ def without_dofs(letter: str, part: Any, kept: npt.NDArray[Any]) -> Any:  # noqa
 
 def _is_load(raw: RawMatrix, n: int) -> bool:
     shape = raw.matrix.shape if raw.dense is None else np.shape(raw.dense)
-    return len(shape) > 1 and shape[0] == n != shape[1]
+    return n > 1 and shape == (n, 1)
 
 
 def _is_skew(matrix: csc_array) -> bool:
@@ -118,9 +118,14 @@ def _on_dofs(letter: str, raw: RawMatrix, n: int, places: Mapping[str, int], wor
         return csc_array(coo_array((entries.data, where), shape=shape))
     if matrix.shape[axis] != n and not (raw.dense is not None and raw.dense.ndim == 1 and raw.dense.size == n):
         size = f"{matrix.shape[0]} x {matrix.shape[1]}"
+        also = (
+            f" If it holds forces, say matrices={{'B': {letter!r}}}."
+            if letter != INPUTS and matrix.shape[0] == n
+            else ""
+        )
         msg = (
-            f"{path}: {letter} is {size}, which does not fit {n} DOFs. If it is something else, leave it out "
-            f"by matrices={{{letter!r}: None}}."
+            f"{path}: {letter} is {size}, which does not fit {n} DOFs.{also} If it is something else, leave it out by "
+            f"matrices={{{letter!r}: None}}."
         )
         raise FileFormatError(msg, path=path)
     return raw.dense if raw.dense is not None and not issparse(raw.dense) else matrix

@@ -20,7 +20,7 @@ from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
 from halfdof_ctrl.files.formats.digits import SINGLE
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
-from halfdof_ctrl.files.formats.variables import Variable
+from halfdof_ctrl.files.formats.variables import PLANE, Variable
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
@@ -73,6 +73,8 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         single = [variable for variable in others if variable.is_matrix]
         if len(single) == 1 and single[0] not in chosen.values():
             chosen = {None: single[0]}
+    if not titles:
+        _require_matrices(chosen, others)
     names = {key: named[key].read() for key in (*TEXTS, "name") if key in named}
     dofs = texts(names, "dofs")
     rounding = _rounding(named)
@@ -85,6 +87,16 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         texts=names,
         own_layout=set(named) >= OWN_LAYOUT,
     )
+
+
+def _require_matrices(chosen: Mapping[str | None, Variable], others: Sequence[Variable]) -> None:
+    """Refuse numbers called K and M beside matrices of other names: they are parameters."""
+    square = [variable for letter, variable in chosen.items() if letter in SQUARE]
+    larger = [variable for variable in others if variable.is_matrix and variable.shape[0] == variable.shape[-1]]
+    if square and larger and not any(variable.is_matrix or variable.kind != "matrix" for variable in square):
+        names = listed([variable.name for variable in square])
+        msg = f"single numbers are called {names}, but {listing(larger)}."
+        raise FileFormatError(msg, path="")
 
 
 def listing(left: Sequence[Variable]) -> str:
@@ -199,8 +211,14 @@ def _as_matrix(letter: str | None, name: str, value: Any) -> tuple[csc_array, An
         matrix.eliminate_zeros()
         return matrix, None
     array = np.asarray(value)
-    if letter in SIGNALS and array.ndim < 2:  # noqa: PLR2004  # a row of F, a column of B, a single number
+    if letter in SIGNALS and array.ndim < PLANE:  # a row of F, a column of B, a single number
         column = np.atleast_2d(array).T if letter[0] == "B" else np.atleast_2d(array)
         return csc_array(np.asarray(column, dtype=np.result_type(array, np.float64))), array
+    if letter in SQUARE and array.ndim == PLANE and array.shape[0] != array.shape[1] and array.dtype.kind in "biufc":
+        msg = (
+            f"{shown} must be square, but it is {array.shape[0]} x {array.shape[1]}. If it is something else, name the "
+            f"right one, matrices={{{letter!r}: name}}, or leave it out, matrices={{{letter!r}: None}}."
+        )
+        raise MatrixError(msg, matrix=shown)
     checked = checked_matrix(array, shown, None if letter in SQUARE[:3] else array.shape if array.ndim > 1 else None)
     return csc_array(checked), array

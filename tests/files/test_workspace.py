@@ -113,6 +113,25 @@ def test_names_of_its_own_are_listed_with_the_argument(tmp_path: Path, ending: s
     assert is_the_model(load_model(path, matrices={"K": "K_c1", "M": "M_c1", "C": "C_c1"}))
 
 
+def test_parameters_called_k_and_m_are_no_model_of_one_dof(tmp_path: Path) -> None:
+    """Beside the matrices of other names that they belong to."""
+    path = written(tmp_path / "a.mat", {"K": 3.0, "M": 2.0, "KK": K, "MM": M})
+    with pytest.raises(FileFormatError, match=r"single numbers are called .*matrices=\{'K': 'KK', 'M': 'MM'\}"):
+        load_model(path)
+
+
+def test_a_state_space_beside_the_matrices_is_left_out_when_said(tmp_path: Path) -> None:
+    """Its C is no damping, its B acts on states; each refusal says how."""
+    path = written(
+        tmp_path / "a.mat", {"K": K, "M": M, "Cd": C, "A": np.eye(6), "B": np.ones((6, 1)), "C": np.ones((1, 6))}
+    )
+    with pytest.raises(FileFormatError, match=r"C must be square, but it is 1 x 6.*matrices=\{'C': name\}"):
+        load_model(path)
+    with pytest.raises(FileFormatError, match=r"B is 6 x 1, which does not fit 3 DOFs.*matrices=\{'B': None\}"):
+        load_model(path, matrices={"C": "Cd"})
+    assert is_the_model(load_model(path, matrices={"C": "Cd", "B": None}))
+
+
 def test_structs_and_cells_are_looked_into(tmp_path: Path) -> None:
     """sys.K and K{1}, by the names that MATLAB gives them."""
     scipy.io.savemat(str(tmp_path / "s.mat"), {"sys": MODEL, "note": "by hand"})

@@ -81,22 +81,27 @@ def mat73_variables(content: bytes) -> list[Variable]:
     h5py = _h5py()
     try:
         with h5py.File(io.BytesIO(content), "r") as file:
-            return _listed(content, file, file, "")
+            return _listed(content, file, file, "", [MOST_PARTS])
     except OSError as cause:
         raise _damaged(cause) from cause
 
 
-def _listed(content: bytes, file: Any, group: Any, before: str) -> list[Variable]:  # noqa: ANN401
+def _listed(content: bytes, file: Any, group: Any, before: str, room: list[int]) -> list[Variable]:  # noqa: ANN401
+    """Describe what a group holds, up to a number of parts in all: groups may hold each other."""
     h5py = _h5py()
-    return [
-        _described(content, file, group[key], f"{before}{key}", group[key].name)
-        for key in list(group)[:MOST_PARTS]
-        if not key.startswith(OWN) and isinstance(group.get(key, getlink=True), h5py.HardLink)
-    ]
+    found = []
+    for key in group:
+        room[0] -= 1
+        if room[0] < 0:
+            break
+        if not key.startswith(OWN) and isinstance(group.get(key, getlink=True), h5py.HardLink):
+            found.append(_described(content, file, group[key], (f"{before}{key}", group[key].name), room))
+    return found
 
 
-def _described(content: bytes, file: Any, item: Any, name: str, where: str) -> Variable:  # noqa: ANN401
-    """Describe a variable by its attributes."""
+def _described(content: bytes, file: Any, item: Any, names: tuple[str, str], room: list[int]) -> Variable:  # noqa: ANN401
+    """Describe a variable by its attributes; `names` are what it is called and where it is."""
+    name, where = names
     kind: Kind = "object"
     shape: tuple[int, ...] = ()
     parts: list[Variable] = []
@@ -104,9 +109,9 @@ def _described(content: bytes, file: Any, item: Any, name: str, where: str) -> V
         columns = item["jc"].shape[0] - 1 if "jc" in item and item["jc"].shape else 0
         kind, shape = "matrix", (int(item.attrs["MATLAB_sparse"]), columns)
     elif not hasattr(item, "dtype"):
-        kind, parts = "struct", _listed(content, file, item, f"{name}.") if name.count(".") < MOST_DEPTH else []
+        kind, parts = "struct", _listed(content, file, item, f"{name}.", room) if name.count(".") < MOST_DEPTH else []
     elif item.dtype.kind == "O":
-        kind, parts = "cell", _cells(content, file, item, name)
+        kind, parts = "cell", _cells(content, file, item, name, room)
     elif _is_char(item):
         kind = "text"
     elif item.dtype.kind in REAL_KINDS or item.dtype.names == ("real", "imag"):
@@ -116,12 +121,12 @@ def _described(content: bytes, file: Any, item: Any, name: str, where: str) -> V
     )
 
 
-def _cells(content: bytes, file: Any, item: Any, name: str) -> list[Variable]:  # noqa: ANN401
+def _cells(content: bytes, file: Any, item: Any, name: str, room: list[int]) -> list[Variable]:  # noqa: ANN401
     if _h5py().check_ref_dtype(item.dtype) is None or not item.size or item.size > MOST_PARTS:
         return []
     cells = [file[reference] for reference in _checked(item, name, len(content)).reshape(-1).tolist() if reference]
     flat = [(number, cell) for number, cell in enumerate(cells, start=1) if not _is_cell(cell)]
-    return [_described(content, file, cell, f"{name}{{{number}}}", cell.name) for number, cell in flat]
+    return [_described(content, file, cell, (f"{name}{{{number}}}", cell.name), room) for number, cell in flat]
 
 
 def _is_cell(item: Any) -> bool:  # noqa: ANN401

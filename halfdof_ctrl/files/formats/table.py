@@ -24,6 +24,8 @@ COMMENTS = (b"#", b"%", b"//", b"!")
 BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 LIKE_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([EeDdQq][-+]?\d+|[-+]\d{2,3})?")
+NAME = re.compile(rb"[A-Za-z_\"'\x80-\xff]")  #: begins the title of a column
+NO_NAMES = (b"nan", b"inf", b"infinity", b"i", b"j")
 REMARK = re.compile(rb"(#|%|//|!)[^\n]*")
 WHOLE = re.compile(rb"\d+")
 DECIMAL_COMMA = re.compile(rb"(?<=\d),(?=\d)")
@@ -133,7 +135,8 @@ def _layout(content: bytes) -> _Layout:
     second = _cut(rows[1], separator, decimal_comma) if len(rows) > 1 else first
     others = [field for field in first if LIKE_NUMBER.fullmatch(field) is None]
     counted = others == [b""] and not first[0] and all(WHOLE.fullmatch(field) for field in first[1:])
-    has_titles = counted or (any(others) and all(WHOLE.fullmatch(field) for field in first if field not in others))
+    words = any(others) and all(NAME.match(field) and field.lower() not in NO_NAMES for field in others if field)
+    has_titles = counted or (words and all(WHOLE.fullmatch(field) for field in first if field not in others))
     names_rows = second[:1] != [b""] and LIKE_NUMBER.fullmatch(second[0]) is None if second else False
     labelled = names_rows or (has_titles and not first[0])
     titles = tuple([field.decode("utf-8", "replace") for field in first]) if has_titles else ()
@@ -181,7 +184,7 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
     if rows != columns:
         return abaqus.read_abaqus(plain, most_rows)
     twice = len(np.unique(places, axis=0)) < rows
-    sparse = None if twice or places.max() > most_rows else abaqus.read_abaqus(plain, most_rows)
+    sparse = None if twice or places.max() > most_rows else _readable_by_place(plain, most_rows)
     is_symmetric = _asymmetry(table) <= SYMMETRIC * float(np.abs(table).max(initial=0.0))
     if sparse is None or (is_symmetric and np.count_nonzero(sparse.matrix.diagonal()) < sparse.matrix.shape[0]):
         return None
@@ -196,6 +199,13 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
         "the banner '%%MatrixMarket matrix coordinate real general'."
     )
     raise FileFormatError(msg, path="")
+
+
+def _readable_by_place(plain: bytes, most_rows: int) -> RawMatrix | None:
+    try:
+        return abaqus.read_abaqus(plain, most_rows)
+    except FileFormatError:  # labels or places that are none, so it is something else
+        return None
 
 
 def _long_by_place(plain: bytes, columns: int, most_rows: int) -> RawMatrix:

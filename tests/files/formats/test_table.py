@@ -86,6 +86,8 @@ def test_a_dense_matrix_of_whole_numbers_is_read_or_refused(n: int, data: st.Dat
         ("1 2 4\n3 1 5\n2 4 7\n", "dense matrix of 3 x 3"),
         ("1 2\n3 4 5\n", "3 numbers where a row has 2"),
         ("1,,2\n,3,4\n2,4,5\n", "an empty cell"),
+        ("nan 2\n3 4\n", "no finite number"),
+        ("1+2i 2\n3 4\n", "no finite number"),
         ("1 2\n3 x\n", "no finite number"),
         ("1.5 1 1 1 2.\n1 1 2 1 2.\n", "places must be whole numbers"),
         ("4 4 999 1\n", "K.txt is 1 x 4, but the matrices of a model must be square"),
