@@ -186,7 +186,8 @@ def _completed(letter: str, source: Source, triangle: Triangle | None) -> RawMat
 
 def _aligned(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[Matrices, tuple[str, ...] | None, list[str]]:
     """Put the matrices on one list of DOFs."""
-    names = {letter: _names_of(found, letter, raw) for letter, raw in raws.items()}
+    longest = max([raw.matrix.shape[0] for raw in raws.values()])
+    names = {letter: _names_of(found, letter, raw, longest) for letter, raw in raws.items()}
     order = [letter for letter in ORDER if letter in raws]
     labelled = [letter for letter in order if names[letter] is not None]
     union: dict[str, int] = {}
@@ -235,7 +236,7 @@ def _require_one_count(
     return []
 
 
-def _names_of(found: Sources, letter: str, raw: RawMatrix) -> tuple[str, ...] | None:
+def _names_of(found: Sources, letter: str, raw: RawMatrix, longest: int) -> tuple[str, ...] | None:
     """Return the names of a matrix's rows: its own, those of the label file beside it, or of the only one that fits."""
     if raw.dofs is not None:
         return raw.dofs
@@ -244,7 +245,7 @@ def _names_of(found: Sources, letter: str, raw: RawMatrix) -> tuple[str, ...] | 
     fitting = own or list({names for names in found.labels.values() if len(names) == n})
     if len(fitting) != 1:
         return None
-    if len(fitting[0]) > n and raw.open_size:
+    if len(fitting[0]) == longest > n and raw.open_size:
         return fitting[0][:n]
     if len(fitting[0]) != n:
         file = next(file for file, names in found.labels.items() if names is fitting[0])
