@@ -52,13 +52,17 @@ def punched_matrices(content: bytes) -> list[PunchedMatrix] | None:
     lines = [line.rstrip(b"\r ") for line in content.split(b"\n")]
     lines = [line for line in lines if line and not line.startswith(b"$")]
     begins = [number for number, line in enumerate(lines) if not line.startswith(b"*")]
+    in_entry = False  #: of DMIG, which goes on in lines that begin with blanks or a plus
     blocks: list[tuple[bytes, list[bytes], list[bytes], list[int]]] = []  # header, columns, rows, rows of each column
     for number, stop in zip(begins, [*begins[1:], len(lines)], strict=True):
         line = lines[number]
         if not line.startswith(KEYWORD):
-            if line.startswith((b"+", b" ")):
+            if line.startswith((b"+", b" ")) and in_entry:
                 return None
-        elif line[FIRST + 8 : FIRST + 16].strip() == b"0" and line[:FIRST] == b"DMIG    ":
+            in_entry = in_entry and line.startswith((b"+", b" "))
+            continue
+        in_entry = True
+        if line[FIRST + 8 : FIRST + 16].strip() == b"0" and line[:FIRST] == b"DMIG    ":
             blocks.append((line, [], [], []))
             if stop > number + 1:
                 return None

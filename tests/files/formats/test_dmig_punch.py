@@ -50,7 +50,7 @@ def test_both_readers_agree(entries: list[tuple[int, int, int, int, float, float
     "content",
     [
         b"DMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,4.0\n",
-        b"DMIG    KAAX           0       6       2       0\nDMIG    KAAX    1       1               1       1       4.\n",
+        (HEADER.format(kind=2) + "DMIG    KAAX    1       1               1       1       4.\n").encode(),
         punched([(1, 1, 1, 1, 4.0, 0.0)], 2).replace(b"D+00", b"X+00"),
         punched([(1, 9, 1, 1, 4.0, 0.0)], 2),
         punched([(1, 1, 1, 1, 4.0, 0.0)], 2).replace(b"DMIG*   KAAX", b"DMIG*   MAAX"),
