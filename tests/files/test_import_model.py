@@ -239,8 +239,11 @@ def test_warnings_of_the_report_are_given_on_loading(tmp_path: Path) -> None:
 
 
 def test_a_half_in_a_container_is_completed_on_request(tmp_path: Path) -> None:
-    """Dense or sparse; without the request it is taken as it is."""
-    np.savez(tmp_path / "a.npz", K=np.tril(K))
+    """Dense or sparse; without the request it is taken as it is, and told."""
+    np.savez(tmp_path / "a.npz", M=M, C=C, K=np.tril(K))
+    with pytest.warns(ImportedModelWarning, match="half of it seems to be missing"):
+        load_model(tmp_path / "a.npz")
+    warnings.simplefilter("ignore", ImportedModelWarning)
     np.testing.assert_array_equal(dense(load_model(tmp_path / "a.npz").K), np.tril(K))
     np.testing.assert_array_equal(dense(load_model(tmp_path / "a.npz", triangle="lower").K), K)
     with pytest.raises(FileFormatError, match=r"a\.npz: triangle='upper'"):
