@@ -49,6 +49,7 @@ class NonlinearReduction:
     moving: tuple[bool, ...]  #: for each element, whether its variables are solved for
     slopes: tuple[FloatArray, ...]  #: G of each element
     rests: dict[int, float]  #: what holds beside an element that stands alone, in the units of its slope; (23)
+    roots: dict[int, Root]  #: solution of (23) for these
     answers: Answers
     A: FloatArray  #: (N, N)
     B: FloatArray  #: (N, m)
@@ -158,6 +159,7 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
         moving=tuple(moving),
         slopes=tuple(kept),
         rests=rests,
+        roots=roots,
         answers=answers_of(geometry, S, kept, moving, roots),
         A=linear.A,
         B=linear.B[:, :m],
