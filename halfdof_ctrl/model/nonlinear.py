@@ -266,6 +266,8 @@ def nlmechss(
         )
         raise ModelSizeError(msg, size=len(model.dofs), limit=LARGEST_NONLINEAR)
     given = (elements,) if isinstance(elements, Spring | Damper | Force) else tuple(elements)
+    for element in given:
+        _require_element(element)
     for element, words in zip(given, element_words(given), strict=True):
         _check(element, words, model)
     named = model if name is None else replace(model, name=name)
@@ -322,11 +324,14 @@ def _law_name(element: Element) -> str:
     return element.law.name if isinstance(element.law, Law) else "linear"
 
 
-def _check(element: object, words: str, model: SecondOrderModel) -> None:
-    """Check an element against the model, and try its law."""
+def _require_element(element: object) -> None:
     if not isinstance(element, Spring | Damper | Force):
         msg = f"Elements are Spring, Damper and Force; {element!r} is a {type(element).__name__}."
         raise ParameterError(msg, parameter="elements", value=element)
+
+
+def _check(element: Element, words: str, model: SecondOrderModel) -> None:
+    """Check an element against the model, and try its law."""
     for dof in element_dofs(element):
         if dof not in model.dofs:
             if dof in model.prescribed:
