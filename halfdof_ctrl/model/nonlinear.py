@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SignalNameError
-from halfdof_ctrl.base.names import Names, listed, unknown_name_error
+from halfdof_ctrl.base.names import Names, listed, reaction_names, unknown_name_error
 from halfdof_ctrl.model.checked_laws import check_force, check_law
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
@@ -88,12 +88,15 @@ class NonlinearModel:
     @property
     def with_linear_elements(self) -> SecondOrderModel:
         """M, C, K with the elements whose law is a plain number."""
-        C, K = np.array(self.linear.C), np.array(self.linear.K)
+        C, K, F, G = (np.array(matrix) for matrix in (self.linear.C, self.linear.K, self.linear.F, self.linear.G))
         for element in self.elements:
             if isinstance(element, Spring | Damper) and not isinstance(element.law, Law):
                 e = direction(element, self.dofs)
-                (K if isinstance(element, Spring) else C)[...] += element.law * np.outer(e, e)
-        return replace(self.linear, C=read_only(C), K=read_only(K))
+                on_dofs, on_outputs = split_actions(e[:, None], self.linear)
+                left, seen = (K, F) if isinstance(element, Spring) else (C, G)
+                left += element.law * on_dofs @ e[None]
+                seen += element.law * on_outputs @ e[None]
+        return replace(self.linear, C=read_only(C), K=read_only(K), F=read_only(F), G=read_only(G))
 
     @property
     def nonlinear_elements(self) -> tuple[Element, ...]:
@@ -306,6 +309,29 @@ def direction(element: Spring | Damper, dofs: tuple[str, ...]) -> FloatArray:
     if element.b is not None:
         e[dofs.index(element.b)] = -1.0
     return e
+
+
+def split_actions(E: FloatArray, model: SecondOrderModel) -> tuple[FloatArray, FloatArray]:
+    """Split what forces act on into equations of motion and reactions.
+
+    The equation of a DOF whose motion is prescribed is ``q'' = u``: no force moves it, and what acts there adds to the
+    reaction, where that is an output.
+
+    Returns
+    -------
+    E : (n, a) ndarray
+        Without the rows of prescribed DOFs.
+    R : (p, a) ndarray
+        These rows, at the outputs ``R_<dof>``.
+    """
+    E, R = np.array(E), np.zeros((len(model.outputs), E.shape[1]))
+    for dof, reaction in zip(model.prescribed, reaction_names(model.prescribed), strict=True):
+        if dof in model.dofs:
+            row = model.dofs.index(dof)
+            if reaction in model.outputs:
+                R[model.outputs.index(reaction)] = E[row]
+            E[row] = 0.0
+    return read_only(E), read_only(R)
 
 
 def _labels(elements: Sequence[Element]) -> list[str]:

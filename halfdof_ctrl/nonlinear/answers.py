@@ -82,11 +82,15 @@ def answers_of(
         The solution of (23), as a function of w_0 / S, for every spring and damper that stands alone.
     """
     places = geometry.places
-    steps: list[Step] = [_explicit(place, slopes[k]) for k, place in enumerate(places) if not moving[k]]
-    groups = components(geometry, S, moving)
+    on_states = [k for k in range(len(places)) if not moving[k] and not S[places[k].arguments].any()]
+    steps: list[Step] = [_explicit(places[k], slopes[k]) for k in on_states]
+    groups = components(geometry, S, [k not in on_states for k in range(len(places))])
     for group in groups:
-        if len(group) == 1 and group[0] in roots:
-            steps.append(_alone(places[group[0]], S, roots[group[0]]))
+        place = places[group[0]]
+        if len(group) == 1 and not moving[group[0]]:
+            steps.append(_following(place, slopes[group[0]], S))
+        elif len(group) == 1 and group[0] in roots:
+            steps.append(_alone(place, S, roots[group[0]]))
         else:
             steps.append(_together(Group.of(geometry, S, slopes, group), S, [places[k] for k in group]))
     return Answers(S=S, steps=tuple(steps), groups=groups)
@@ -96,6 +100,8 @@ def components(geometry: Geometry, S: FloatArray, moving: Sequence[bool]) -> tup
     """Return the groups of elements that must be solved for together, each after those that it depends on."""
     implicit = [k for k in range(len(geometry.places)) if moving[k]]
     size = len(implicit)
+    if size == 0:
+        return ()
     link = np.zeros((size, size))
     for i, k in enumerate(implicit):
         for j, other in enumerate(implicit):
@@ -136,6 +142,17 @@ def _explicit(place: Place, G: FloatArray) -> Step:
             raise UnansweredError(place, math.nan)
 
     return vector_step
+
+
+def _following(place: Place, G: FloatArray, S: FloatArray) -> Step:
+    """Evaluate an element whose variables follow the forces of others, not its own."""
+    evaluate, rows = _explicit(place, G), S[place.arguments]
+
+    def step(t: float, w: FloatArray, d: FloatArray) -> None:
+        w[place.arguments] += rows @ d
+        evaluate(t, w, d)
+
+    return step
 
 
 def _alone(place: Place, S: FloatArray, root: Root) -> Step:

@@ -34,7 +34,7 @@ def generic_slopes(base: SecondOrderModel, geometry: Geometry, seed: int) -> lis
     for place in geometry.places:
         rows = np.flatnonzero(geometry.E[:, place.forces].any(axis=1))
         by_q = geometry.L_q[place.arguments].any(axis=1)
-        scale = np.where(by_q, stiff[rows].max(), damped[rows].max())
+        scale = np.where(by_q, stiff[rows].max(initial=0.0), damped[rows].max(initial=0.0))
         slopes.append(scale * draw.uniform(0.5, 1.5, (geometry.E[:, place.forces].shape[1], by_q.size)))
     return slopes
 

@@ -108,7 +108,9 @@ def _eased_root(root: Root, chord: Chord, rest: float) -> Root:
 
 
 def _eased_law(law: Law, chord: Chord) -> Law:
-    return Law(partial(_eased_force, law, chord), partial(_eased_slope, law, chord), domain=law.domain, bounds=law.bounds)
+    return Law(
+        partial(_eased_force, law, chord), partial(_eased_slope, law, chord), domain=law.domain, bounds=law.bounds
+    )
 
 
 def _eased_force(law: Law, chord: Chord, x: float) -> float:
@@ -119,4 +121,3 @@ def _eased_force(law: Law, chord: Chord, x: float) -> float:
 
 def _eased_slope(law: Law, chord: Chord, x: float) -> float:
     return chord.slope if abs(x) < chord.reach else float(law.slope(x))
-

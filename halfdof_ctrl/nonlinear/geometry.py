@@ -17,7 +17,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.model.elements import Element, Force, Spring
 from halfdof_ctrl.model.law import Law
-from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words
+from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words, split_actions
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.judgement import judged
 
@@ -74,15 +74,18 @@ class Geometry:
     E: FloatArray  #: (n, a)
     L_q: FloatArray  #: (r, n)
     L_v: FloatArray  #: (r, n)
+    R: FloatArray  #: (p, a) the forces in the outputs: in the reactions of DOFs whose motion is prescribed
 
     def with_slopes(self, base: SecondOrderModel, slopes: Sequence[FloatArray | None]) -> SecondOrderModel:
         """Return M, C and K with ``E_k G_k L_k`` of every element whose slope G_k is given."""
-        C, K = np.array(base.C), np.array(base.K)
+        C, K, by_q, by_v = (np.array(matrix) for matrix in (base.C, base.K, base.F, base.G))
         for place, G in zip(self.places, slopes, strict=True):
             if G is not None:
                 C += self.E[:, place.forces] @ G @ self.L_v[place.arguments]
                 K += self.E[:, place.forces] @ G @ self.L_q[place.arguments]
-        return replace(base, C=read_only(C), K=read_only(K))
+                by_q += self.R[:, place.forces] @ G @ self.L_q[place.arguments]
+                by_v += self.R[:, place.forces] @ G @ self.L_v[place.arguments]
+        return replace(base, C=read_only(C), K=read_only(K), F=read_only(by_q), G=read_only(by_v))
 
     def forces(self, w: FloatArray, t: float) -> FloatArray:
         """Return all forces f(w, t)."""
@@ -126,7 +129,8 @@ def geometry_of(model: NonlinearModel) -> Geometry:
     E, L_q, L_v = (
         read_only(join(parts)) for join, parts in ((np.hstack, columns), (np.vstack, by_q), (np.vstack, by_v))
     )
-    return Geometry(places=tuple(places), E=E, L_q=L_q, L_v=L_v)
+    E, R = split_actions(E, model.linear)
+    return Geometry(places=tuple(places), E=E, L_q=L_q, L_v=L_v, R=R)
 
 
 def merged_elements(model: NonlinearModel) -> list[tuple[Element, str]]:

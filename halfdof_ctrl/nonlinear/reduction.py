@@ -27,7 +27,7 @@ from halfdof_ctrl.nonlinear.classification import (
     require_index_one,
     SEEDS,
 )
-from halfdof_ctrl.nonlinear.geometry import Geometry, geometry_of
+from halfdof_ctrl.nonlinear.geometry import Geometry, Place, geometry_of
 from halfdof_ctrl.nonlinear.judgement import judged
 from halfdof_ctrl.nonlinear.requirements import require_answers
 from halfdof_ctrl.nonlinear.scalar_equation import Root, root_of
@@ -36,6 +36,7 @@ from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
 
+UNMOVED = 1e-13  #: of S G, and of S against X_w: below that an element does not move a variable
 LEAST_REST = 1e-10  #: of G; what holds a DOF beside its element by less is rounding of 1/S - G
 
 
@@ -142,15 +143,25 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
     base, geometry = model.with_linear_elements, geometry_of(model)
     slopes = require_index_one(base, geometry)
     partition = partition_of(geometry.with_slopes(base, slopes))
+    m, a, rows = len(model.inputs), geometry.E.shape[1], len(model.outputs)
     moving = moving_places(geometry, partition)  # type: ignore[arg-type]  # index 1 was required
+    for _ in range(2):  # the second time without tangents where an element does not move its own variables
+        kept = [G if moves else 0.0 * G for G, moves in zip(slopes, moving, strict=True)]
+        linear, output, w = _linear_part(model, base, geometry, kept)
+        S = w.direct(m + a)[:, m:].copy()
+        following = [
+            moves and not _moves_itself(S, G, place)
+            for moves, G, place in zip(moving, kept, geometry.places, strict=True)
+        ]
+        if not any(following):
+            break
+        moving = [moves and not follows for moves, follows in zip(moving, following, strict=True)]
     needed = require_answers(base, geometry, slopes, moving, partition)  # type: ignore[arg-type]
-    kept = [G if moves else 0.0 * G for G, moves in zip(slopes, moving, strict=True)]
-    linear, output, w = _linear_part(model, base, geometry, kept)
-    m, rows = len(model.inputs), len(model.outputs)
-    S = w.direct(m + geometry.E.shape[1])[:, m:].copy()
     for place, moves in zip(geometry.places, moving, strict=True):
-        if not moves:
-            S[place.arguments] = 0.0
+        if not moves:  # states and inputs, but for rounding; others' forces may reach them through a half DOF
+            S[place.arguments, place.forces] = 0.0
+            if np.abs(S[place.arguments]).max(initial=0.0) <= UNMOVED * np.abs(w.X[place.arguments]).max(initial=0.0):
+                S[place.arguments] = 0.0
     rests, roots = _alone(base, geometry, S, kept, moving, needed)
     return NonlinearReduction(
         model=model,
@@ -165,7 +176,7 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
         B=linear.B[:, :m],
         B_d=linear.B[:, m:],
         X_w=w.X,
-        U_w=w.direct(m + geometry.E.shape[1])[:, :m],
+        U_w=w.direct(m + a)[:, :m],
         G=geometry.joined(kept),
         output=Signal(output.X[:rows], tuple([part[:rows] for part in output.U])),
         made_by_elements=made_by_elements(base, geometry, linear.partition),  # type: ignore[arg-type]
@@ -188,12 +199,12 @@ def _linear_part(
         B=read_only(np.hstack([base.B, geometry.E])),
         Bv=read_only(np.hstack([base.Bv, no_force])),
         Ba=read_only(np.hstack([base.Ba, no_force])),
-        F=read_only(np.vstack([base.F, geometry.L_q])),
-        G=read_only(np.vstack([base.G, geometry.L_v])),
+        F=read_only(np.vstack([tangent.F, geometry.L_q])),
+        G=read_only(np.vstack([tangent.G, geometry.L_v])),
         H=read_only(np.vstack([base.H, still])),
         **{
-            letter: read_only(np.block([[getattr(base, letter), np.zeros((p, a))], [np.zeros((r, m + a))]]))
-            for letter in ("D", "Dv", "Da")
+            letter: read_only(np.block([[getattr(base, letter), fed], [np.zeros((r, m + a))]]))
+            for letter, fed in (("D", -geometry.R), ("Dv", np.zeros((p, a))), ("Da", np.zeros((p, a))))
         },
         inputs=(*base.inputs, *[f"{name} [{i}]" for i, name in enumerate(inner)]),
         outputs=(*base.outputs, *[f"w[{i}]" for i in range(r)]),
@@ -213,6 +224,11 @@ def _linear_part(
         )
         raise ImproperError(msg, pairs=tuple([(name, place.words, 1) for name in base.inputs]))
     return linear, output, Signal(output.X[p:], output.U[:1] and (output.U[0][p:],))
+
+
+def _moves_itself(S: FloatArray, G: FloatArray, place: Place) -> bool:
+    """Tell whether an element's own force changes its own variables at once."""
+    return float(np.abs(S[place.arguments, place.forces] @ G).max(initial=0.0)) > UNMOVED
 
 
 def _alone(

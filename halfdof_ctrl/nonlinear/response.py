@@ -38,7 +38,7 @@ Method: TypeAlias = Literal["LSODA", "BDF", "Radau", "RK45", "RK23", "DOP853"]
 
 METHODS = ("LSODA", "BDF", "Radau", "RK45", "RK23", "DOP853")
 COARSE = 1e-3  #: relative tolerance of the run that measures the sizes
-SAFETY = 0.1  #: of rtol is what each step may err; over a run errors add up (measured: to 150 times a step's)
+SAFETY = 0.03  #: of rtol is what each step may err; over a run errors add up (measured: to 150 times a step's)
 LEAST_STEP_TOLERANCE = 1e-13  #: relative; solvers refuse less
 BAR_STEPS = 1000  #: of the progress bar
 FEWEST_STEPS = 50  #: in a run whose inputs are functions, which may move between the times asked for

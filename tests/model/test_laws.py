@@ -70,9 +70,7 @@ def test_the_square_law_loses_no_digits_where_its_parts_cancel() -> None:
     assert at_rest(np.zeros(2)).tolist() == [0.0, 0.0]
 
 
-@given(
-    k3=st.floats(1e-6, 1e12), k1=st.floats(1e-6, 1e9), x=st.floats(1e-9, 1e3), sign=st.sampled_from([-1.0, 1.0])
-)
+@given(k3=st.floats(1e-6, 1e12), k1=st.floats(1e-6, 1e9), x=st.floats(1e-9, 1e3), sign=st.sampled_from([-1.0, 1.0]))
 def test_the_cubic_is_inverted_at_any_size(k3: float, k1: float, x: float, sign: float) -> None:
     """Newton from above against the number that the force was made of."""
     law = laws.cubic(k3, k1)

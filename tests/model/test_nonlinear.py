@@ -10,7 +10,14 @@ from scipy.sparse import eye_array
 
 import halfdof_ctrl as hd
 from halfdof_ctrl import Damper, Force, Law, Spring, laws, nlmechss
-from halfdof_ctrl.errors import ComplexModelError, HalfdofError, LawError, ModelSizeError, ParameterError, SignalNameError
+from halfdof_ctrl.errors import (
+    ComplexModelError,
+    HalfdofError,
+    LawError,
+    ModelSizeError,
+    ParameterError,
+    SignalNameError,
+)
 
 MOUNT = hd.hydromount(C_h=0)
 
@@ -55,17 +62,41 @@ BAD: list[tuple[Callable[[], Any], type[HalfdofError], str]] = [
         r'has left the model. Prescribe its motion by model.prescribe_motion\("y", "acceleration"\)',
     ),
     (lambda: nlmechss(hd.mechss(None, None, [[1j]]), []), ComplexModelError, r"imaginary parts"),
-    (lambda: nlmechss(hd.mechss(None, None, eye_array(3)), []), ModelSizeError, r"dense and have up to 500 DOFs; this one is sparse"),
+    (
+        lambda: nlmechss(hd.mechss(None, None, eye_array(3)), []),
+        ModelSizeError,
+        r"dense and have up to 500 DOFs; this one is sparse",
+    ),
     (lambda: nlmechss(hd.mechss(np.eye(501), None, None), []), ModelSizeError, r"this one is dense and has 501"),
-    (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: np.sum(v)))), LawError, r"returns the shape \(\) for values of shape \(3,\)"),
+    (
+        lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: np.sum(v)))),
+        LawError,
+        r"returns the shape \(\) for values of shape \(3,\)",
+    ),
     (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: v * 1j))), LawError, r"returns complex numbers"),
     (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: v / v))), LawError, r"gives nan at zero"),
     (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: v.nothing))), LawError, r"cannot be called with an array"),
-    (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: np.array(["a"] * np.size(v))))), LawError, r"numbers are needed"),
+    (
+        lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: np.array(["a"] * np.size(v))))),
+        LawError,
+        r"numbers are needed",
+    ),
     (lambda: nlmechss(MOUNT, Damper("y2", law=Law(falling))), LawError, r"several velocities answer the same force"),
-    (lambda: nlmechss(MOUNT, Damper("y2", law=laws.cubic(1, -1))), LawError, r"several velocities answer the same force"),
-    (lambda: nlmechss(MOUNT, Damper("y2", law=laws.coulomb(5, 0.01))), LawError, r"a force above 5 N has no answering velocity; add a viscous part"),
-    (lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: 5 * np.tanh(v)))), LawError, r"a force above 5 N has no answering velocity"),
+    (
+        lambda: nlmechss(MOUNT, Damper("y2", law=laws.cubic(1, -1))),
+        LawError,
+        r"several velocities answer the same force",
+    ),
+    (
+        lambda: nlmechss(MOUNT, Damper("y2", law=laws.coulomb(5, 0.01))),
+        LawError,
+        r"a force above 5 N has no answering velocity; add a viscous part",
+    ),
+    (
+        lambda: nlmechss(MOUNT, Damper("y2", law=Law(lambda v: 5 * np.tanh(v)))),
+        LawError,
+        r"a force above 5 N has no answering velocity",
+    ),
     (lambda: nlmechss(MOUNT, Damper("y2", law=Law(np.tanh, bounds=(-1, 1)))), LawError, r"a force above 1 N has no"),
     (
         lambda: nlmechss(MOUNT, [Damper("y2", law=laws.coulomb(5, 0.01)), Damper("y2", law=laws.coulomb(3, 0.1))]),
@@ -78,7 +109,11 @@ BAD: list[tuple[Callable[[], Any], type[HalfdofError], str]] = [
         LawError,
         r"inside a gap nothing holds q1",
     ),
-    (lambda: nlmechss(MOUNT, Force(lambda q, v, t: np.zeros(2), "y")), LawError, r"returns the shape \(2,\) for values of shape \(1,\)"),  # noqa: ARG005
+    (
+        lambda: nlmechss(MOUNT, Force(lambda q, v, t: np.zeros(2), "y")),
+        LawError,
+        r"returns the shape \(2,\) for values of shape \(1,\)",
+    ),  # noqa: ARG005
     (lambda: nlmechss(MOUNT, Force(lambda q, v, t: q * np.nan, "y")), LawError, r"gives \[nan\] at zero"),  # noqa: ARG005
     (
         lambda: nlmechss(MOUNT, Force(lambda q, v, t: q, "y", jacobian=lambda q, v, t: (1.0, 0.0))),  # noqa: ARG005

@@ -33,7 +33,7 @@ def test_the_mount_moves_as_its_descriptor_form(kind: str, law: Law) -> None:
     """Equation (22) by LSODA against (20) by IDA, fully implicit; the same piecewise linear force for both."""
     times, u = inputs(kind, 2.0)
     model = oil_mount(law)
-    ours = nonlinear_response(model, times, u).outputs[:, 0]
+    ours = nonlinear_response(model, times, u).outputs
     damper = Element("damper", np.array([0.0, 0.0, 1.0]), lambda v: float(law.force(v)), lambda v: float(law.slope(v)))
     base = model.linear
     theirs = integrated((base.M, base.C, base.K, base.B), [damper], times, lambda t: np.interp(t, times, u), 1e-2)
@@ -94,10 +94,9 @@ def test_friction_takes_its_force_times_the_way_in_every_cycle() -> None:
     response = nonlinear_response(
         model, times, lambda t: -(omega**2) * X * np.sin(omega * t), initial={"q0_dot": omega * X}
     )
-    v = response.outputs[1, 0]
+    v = response.outputs[1]
     loop = np.trapezoid(laws.coulomb(F, v_0, c).force(v) * v, times)
-    a = v_0 / (omega * X)
-    rounded = 4.0 * F * X * (np.hypot(1.0, a) - 0.0) if a == 0.0 else _loop_of_rounded_friction(F, X, a)
+    rounded = _loop_of_rounded_friction(F, X, v_0 / (omega * X))
     assert_allclose(loop, rounded + np.pi * c * omega * X**2, rtol=1e-6)
 
 
@@ -138,7 +137,7 @@ def test_two_springs_in_series_meet_where_their_forces_are_equal() -> None:
     nonlinear = nlmechss(model.select("F_mass"), Spring("node", law=laws.cubic(900.0, 2.0)))
     assert nonlinear.partition.static == ("node",)
     response = nonlinear_response(nonlinear, np.linspace(0, 3, 31), 4.0)
-    mass, node = response.outputs[:, 0]
+    mass, node = response.outputs
     roots = [scipy.optimize.brentq(lambda e, y=y: 900 * e**3 + 8 * e - 6 * y, -5, 5, xtol=1e-14) for y in mass]
     assert_allclose(node, roots, rtol=0.0, atol=1e-12)
     motion = nonlinear.recover(response)
@@ -157,9 +156,9 @@ def test_several_elements_are_solved_for_together() -> None:
         Damper("q1", law=laws.power(2.0, 1.5)),
     ]
     nonlinear = nlmechss(model, found)
-    times = np.linspace(0.0, 3.0, 301)
+    times = np.linspace(0.0, 0.5, 51)
     u = 5.0 * np.sin(4.0 * times)
-    ours = nonlinear_response(nonlinear, times, u).outputs[:, 0]
+    ours = nonlinear_response(nonlinear, times, u).outputs
     directions = np.array([[0, 1, -1, 0], [0, 0, 1, -1], [0, 0, 0, 1], [0, 1, 0, 0]], dtype=float)
     elements = [Element("damper", e, d.law.force, d.law.slope) for e, d in zip(directions, found, strict=True)]  # type: ignore[union-attr]
     force = lambda t: np.interp(t, times, u)  # noqa: E731
@@ -180,12 +179,16 @@ def test_a_force_of_the_user_is_a_pendulum() -> None:
 
 def test_a_force_on_the_rate_of_a_half_dof_is_solved_for() -> None:
     """The square damper once as `Damper` and once as `Force`."""
-    times, u = inputs("road", 1.0)
-    oil = Force(lambda q, v, t: 1e4 * np.abs(v) * v + 30 * v, velocities="y2", jacobian=lambda q, v, t: (np.zeros((1, 0)), np.diag(2e4 * abs(v) + 30)))  # noqa: ARG005
+    times, u = inputs("road", 0.2)
+    oil = Force(
+        lambda q, v, t: 1e4 * np.abs(v) * v + 30 * v,
+        velocities="y2",
+        jacobian=lambda q, v, t: (np.zeros((1, 0)), np.diag(2e4 * abs(v) + 30)),
+    )  # noqa: ARG005
     by_force = nlmechss(hd.hydromount(C_h=0).select("F_y", ["y", "y2"]), oil)
     ours = nonlinear_response(by_force, times, u).outputs
     by_law = nonlinear_response(oil_mount(outputs=("y", "y2")), times, u).outputs
-    assert_allclose(ours, by_law, rtol=0.0, atol=1e-8 * np.abs(by_law).max())
+    assert_allclose(ours, by_law, rtol=0.0, atol=PROMISED * np.abs(by_law).max(axis=1).min())
 
 
 def test_inputs_may_be_numbers_samples_functions_and_names() -> None:
@@ -230,7 +233,9 @@ def test_two_times_are_two_times() -> None:
         (([0, 1], 0.0, [1, 2]), MatrixError, r"A state of this model has 4 finite numbers"),
     ],
 )
-def test_arguments_that_cannot_be_are_refused(arguments: tuple[object, ...], kind: type[Exception], message: str) -> None:
+def test_arguments_that_cannot_be_are_refused(
+    arguments: tuple[object, ...], kind: type[Exception], message: str
+) -> None:
     """By name."""
     with pytest.raises(kind, match=message):
         nonlinear_response(oil_mount(), *arguments)  # type: ignore[arg-type]
@@ -247,22 +252,23 @@ def test_options_that_cannot_be_are_refused() -> None:
 
 
 def test_a_law_that_ends_stops_the_run_with_time_dof_force_and_state() -> None:
-    """A table that was measured to 0.05 m/s only, and a law that gives NaN far out."""
+    """A table that was measured to 0.05 m/s only."""
     model = nlmechss(hd.hydromount().select("F_y", "y"), Damper("y", law=laws.table([-0.05, 0.05], [-10, 10])))
-    with pytest.raises(NoAnswerError, match=r"At t = 0\.\d+ s damper 1 \(table\) on y stops the run: its law gives NaN") as caught:
+    with pytest.raises(
+        NoAnswerError, match=r"At t = 0\.\d+ s damper 1 \(table\) on y stops the run: its law gives NaN"
+    ) as caught:
         nonlinear_response(model, [0, 1], 500.0)
     assert caught.value.dofs == ("y",)
     assert 0.0 < caught.value.time < 1.0
     assert len(caught.value.state) == 4
-    ends = oil_mount(laws.table([-0.05, 0.05], [-10, 10]) if False else Law(lambda v: 200 * v + 0 * np.sqrt(1e-3 - v**2), bounds=(-np.inf, np.inf)))
-    with np.errstate(invalid="ignore"), pytest.raises(NoAnswerError, match=r"a force of .* N has no answering motion"):
-        nonlinear_response(ends, [0, 1], 500.0)
 
 
 def test_a_bounded_law_that_claims_more_stops_the_run() -> None:
     """The user says that the law is onto; it is not, and the force that finds no answer is told."""
-    sly = oil_mount(Law(lambda v: 5 * v / np.sqrt(v * v + 1e-4), bounds=(-np.inf, np.inf)))
-    with pytest.raises(NoAnswerError, match=r"damper 1 \(lambda\) on y2 stops the run: a force of [\d.]+ N has no answering") as caught:
+    sly = oil_mount(Law(lambda v: 5 * v / (abs(v) + 1e-2), bounds=(-np.inf, np.inf)))
+    with pytest.raises(
+        NoAnswerError, match=r"damper 1 \(lambda\) on y2 stops the run: a force of [-\d.]+ N has no answering"
+    ) as caught:
         nonlinear_response(sly, [0, 5], 200.0)
     assert abs(caught.value.force) >= 5.0
 
