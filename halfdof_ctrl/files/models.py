@@ -2,7 +2,7 @@
 
 | what | endings | content |
 |---|---|---|
-| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed if there), dofs, inputs, outputs, name |
+| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed, elements if there), dofs, inputs, outputs, name |
 | model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `modelimport` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
@@ -28,7 +28,9 @@ from halfdof_ctrl.files.import_model import container_report, filled, import_mod
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.naming import naming_the_file
 from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.model.law_text import elements_from_stored, stored_elements
 from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 
 Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
@@ -36,12 +38,13 @@ OPTIONAL_LETTERS = ("Bv", "Ba", "Dv", "Da")  #: written only where they are not 
 MODEL_NAMES = ("dofs", "inputs", "outputs")
 
 
-def save_model(model: SecondOrderModel, path: PathLike) -> None:
+def save_model(model: SecondOrderModel | NonlinearModel, path: PathLike) -> None:
     """Write a model to a file that `load_model` reads back exactly.
 
     Parameters
     ----------
-    model : SecondOrderModel
+    model : SecondOrderModel or NonlinearModel
+        Laws are kept by name and numbers, in the variable ``elements``.
     path : path-like
         Ends in ``.npz``, or in ``.mat`` for MATLAB (version 5), where ``mechss`` takes the same letters.
 
@@ -49,6 +52,8 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     ------
     FileFormatError
         Another ending, or a name that files cannot keep (control characters).
+    ParameterError
+        An element with a function of the user's own.
     OSError
         The file cannot be written.
 
@@ -60,11 +65,14 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     ...     load_model(f"{folder}/mount.npz").outputs
     ('y', 'y1', 'y2')
     """
+    elements = stored_elements(model.elements) if isinstance(model, NonlinearModel) else ()
+    model = model.linear if isinstance(model, NonlinearModel) else model
     kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or not is_zero(getattr(model, letter))]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
     names = {key: getattr(model, key) for key in MODEL_NAMES}
-    save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
+    more = {"prescribed": model.prescribed, "elements": elements}
+    save_matrices(path, content, names | {key: texts for key, texts in more.items() if texts}, model.name)
 
 
 def load_model(
@@ -73,7 +81,7 @@ def load_model(
     triangle: Triangle | None = None,
     remove_fixed: bool = False,
     matrices: Mapping[str, str] | None = None,
-) -> SecondOrderModel:
+) -> Any:  # noqa: ANN401  # a union would make every reader of linear models check
     """Read a model from a file, or from the files that a finite-element program wrote.
 
     Parameters
@@ -96,7 +104,7 @@ def load_model(
 
     Returns
     -------
-    SecondOrderModel
+    SecondOrderModel, or NonlinearModel where the file has ``elements`` that `save_model` wrote
         Its DOFs are named by node and component (``n101_u1``) where the files have labels.
 
     Raises
@@ -122,7 +130,7 @@ def load_model(
     if not _is_container(path):
         return import_model(_as_paths(path), triangle=triangle, remove_fixed=remove_fixed, matrices=matrices)
     path = _single(path)
-    content = load_variables(path, (*LETTERS, *MODEL_NAMES, "prescribed", "name"))
+    content = load_variables(path, (*LETTERS, *MODEL_NAMES, "prescribed", "elements", "name"))
     if "K" not in content:
         found = f"it has {listed(sorted(content))}" if content else "it has none of a model's letters"
         msg = f"{path}: no stiffness K in the file ({found}). A model file holds M, C and K, capital letters."
@@ -133,8 +141,12 @@ def load_model(
         names: dict[str, Any] = {key: texts(content, key) for key in MODEL_NAMES}
         prescribed = texts(content, "prescribed")
         if not prescribed:
-            return mechss(**values, **names, name=single_text(content))
-        return _with_prescribed(mechss(**values, dofs=names["dofs"], name=single_text(content)), names, prescribed)
+            model = mechss(**values, **names, name=single_text(content))
+        else:
+            plain = mechss(**values, dofs=names["dofs"], name=single_text(content))
+            model = _with_prescribed(plain, names, prescribed)
+        elements = texts(content, "elements")
+        return nlmechss(model, elements_from_stored(elements)) if elements else model
 
 
 def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescribed: Sequence[str]) -> SecondOrderModel:

@@ -12,6 +12,8 @@ from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.errors import LawError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import Values
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.nonlinear.classification import SEEDS, generic_slopes
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 
 if TYPE_CHECKING:
@@ -19,7 +21,8 @@ if TYPE_CHECKING:
 
 MOST_STEPS = 200  #: of Newton
 MOST_HALVINGS = 50  #: of one step
-PARTS = (1, 4, 16, 64)  #: in how many parts the load is put on, if fewer do not do
+LOADED = tuple((0.0, part / 16) for part in range(1, 17))  #: (share of a helping spring, of the load): the load grows
+RELEASED = (*((10.0**-power, 1.0) for power in range(9)), (0.0, 1.0))  #: or springs that hold everything are let go
 REST = 1e-12  #: force left over, relative to the largest one, at which it is at rest
 SINGULAR = 1e-13  #: reciprocal condition of the scaled stiffness below which something is loose
 
@@ -51,18 +54,24 @@ def equilibrium_of(reduction: "NonlinearReduction", inputs: Values) -> Equilibri
         msg = f"The motion of {listed(names)} is prescribed and does not rest under these inputs. Set them to zero."
         raise LawError(msg, element="prescribed motion", dofs=names)
     free = np.flatnonzero(~held)
-    for parts in PARTS:
+    q = np.zeros(len(model.dofs))
+    for path in (((0.0, 1.0),), LOADED, RELEASED):
         q = np.zeros(len(model.dofs))
-        for part in range(1, parts + 1):
-            found = _newton(reduction, base.K, load * (part / parts), q, free)
+        for helping, share in path:
+            found = _newton(reduction, base.K + helping * _help(reduction, base), load * share, q, free)
             if found is None:
                 break
             q = found
         else:
-            return _checked(
-                reduction, q, u, float(np.abs(_left_over(reduction, base.K, load, q)[free]).max(initial=0.0))
-            )
+            left = np.abs(_left_over(reduction, base.K, load, q)[free]).max(initial=0.0)
+            return _checked(reduction, q, u, float(left))
     raise _no_rest(reduction, base.K, load, q, free)
+
+
+def _help(reduction: "NonlinearReduction", base: SecondOrderModel) -> FloatArray:
+    """Return a stiffness in the place of every element, of the size of what else is there."""
+    slopes = [np.abs(G) for G in generic_slopes(base, reduction.geometry, SEEDS[0])]
+    return np.asarray(reduction.geometry.with_slopes(base, slopes).K - base.K)
 
 
 def _checked(reduction: "NonlinearReduction", q: FloatArray, u: FloatArray, residual: float) -> Equilibrium:

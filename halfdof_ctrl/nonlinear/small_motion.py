@@ -41,6 +41,8 @@ def feedback_of_elements(
         An infinite slope.
     """
     geometry = reduction.geometry
+    if not geometry.places:
+        return np.zeros((0, 0))
     slopes = geometry.slopes(w, t)
     for place, slope, moves in zip(geometry.places, slopes, reduction.moving, strict=True):
         if np.isnan(slope).any() or (np.isinf(slope).any() and not moves):
