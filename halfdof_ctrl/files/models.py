@@ -2,7 +2,7 @@
 
 | what | endings | content |
 |---|---|---|
-| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed, elements if there), dofs, inputs, outputs, name |
+| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed, elements), dofs, inputs, outputs, name |
 | model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `modelimport` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |

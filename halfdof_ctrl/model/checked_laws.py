@@ -69,8 +69,8 @@ def _tried(function: Any, values: Any, what: str, element: str, dofs: tuple[str,
             return function(values)
     except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as cause:
         msg = (
-            f"The {what} of {element} cannot be called with {'an array' if np.ndim(values) else 'a number'}: {cause}. It "
-            "must take both and return as much."
+            f"The {what} of {element} cannot be called with {'an array' if np.ndim(values) else 'a number'}: {cause}. "
+            "It must take both and return as much."
         )
         raise LawError(msg, element=element, dofs=dofs) from cause
 

@@ -1,6 +1,7 @@
 """Laws and elements as text, for files and the command line: parsed by a small grammar, never evaluated.
 
-    law      = name "(" [value {"," value}] ")" | number          value = [name "="] (number | "[" numbers "]" | "linear")
+    law      = name "(" [value {"," value}] ")" | number
+    value    = [name "="] (number | "[" numbers "]" | "linear")
     element  = ("spring" | "damper") a [b] law
 
 Names of laws are those of `halfdof_ctrl.laws`; anything else is refused, so nothing in a text can run.
@@ -81,7 +82,8 @@ def element_from_text(text: str) -> Spring | Damper:
     found = ELEMENT.fullmatch(text)
     ends = _ends(found.group(2)) if found else []
     if found is None or found.group(1) not in KINDS or not 1 <= len(ends) <= MOST_ENDS:
-        msg = f'An element is "spring" or "damper", one or two DOFs and a law, as in "damper y2 quadratic(1e4,30)", not {text!r}.'
+        usual = '"spring" or "damper", one or two DOFs and a law, as in "damper y2 quadratic(1e4,30)"'
+        msg = f"An element is {usual}, not {text!r}."
         raise ParameterError(msg, parameter="element", value=text)
     return KINDS[found.group(1)](ends[0], ends[1] if len(ends) == MOST_ENDS else None, law_from_text(found.group(3)))
 

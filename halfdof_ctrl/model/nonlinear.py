@@ -257,7 +257,8 @@ def nlmechss(
       damper 1: Damper("oil", law=quadratic(2))
       oil: half, by damper 1 (quadratic); its column of C is null
     """
-    if not isinstance(model, SecondOrderModel):
+    given_model: object = model
+    if not isinstance(given_model, SecondOrderModel):
         msg = f"nlmechss takes a model made by mechss and the elements to add, not a {type(model).__name__}."
         raise ParameterError(msg, parameter="model", value=model)
     if model.is_complex:
@@ -265,7 +266,8 @@ def nlmechss(
     if model.is_sparse or len(model.dofs) > LARGEST_NONLINEAR:
         msg = (
             f"Nonlinear models are dense and have up to {LARGEST_NONLINEAR} DOFs; this one is "
-            f"{'sparse' if model.is_sparse else 'dense'} and has {len(model.dofs)}: take as_dense() or truncate_modes first."
+            f"{'sparse' if model.is_sparse else 'dense'} and has {len(model.dofs)}: take as_dense() or truncate_modes "
+            "first."
         )
         raise ModelSizeError(msg, size=len(model.dofs), limit=LARGEST_NONLINEAR)
     given = (elements,) if isinstance(elements, Spring | Damper | Force) else tuple(elements)
@@ -362,8 +364,9 @@ def _check(element: Element, words: str, model: SecondOrderModel) -> None:
         if dof not in model.dofs:
             if dof in model.prescribed:
                 msg = (
-                    f"{words} sits on {dof}, whose displacement is prescribed, so that it has left the model. Prescribe "
-                    f'its motion by model.prescribe_motion("{dof}", "acceleration") instead, which keeps it as a DOF.'
+                    f"{words} sits on {dof}, whose displacement is prescribed, so that it has left the model. "
+                    f'Prescribe its motion by model.prescribe_motion("{dof}", "acceleration") instead, which keeps '
+                    "it as a DOF."
                 )
                 raise SignalNameError(msg, names=(dof,))
             raise unknown_name_error(dof, f"DOF for {words}:", model.dofs)

@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import FloatArray
@@ -109,7 +108,7 @@ def components(geometry: Geometry, S: FloatArray, moving: Sequence[bool]) -> tup
             link[i, j] = block.max(initial=0.0)
     own = np.sqrt(np.abs(np.diag(link)))
     depends = link > UNCOUPLED * np.outer(own, own)
-    count, label = connected_components(csr_array(depends), directed=True, connection="strong")
+    count, label = connected_components(depends.astype(float), directed=True, connection="strong")
     groups = [[i for i in range(size) if label[i] == one] for one in range(count)]
     done: list[list[int]] = []
     while len(done) < count:  # a group comes when all that it depends on are there

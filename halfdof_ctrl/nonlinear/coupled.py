@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.nonlinear.geometry import Geometry, Place
 from halfdof_ctrl.nonlinear.scalar_equation import root_of
@@ -42,8 +42,8 @@ class Group:
     """The elements of a group, for r variables and a forces of their own."""
 
     places: tuple[Place, ...]
-    rows: FloatArray  #: (r,) places of the variables in w
-    columns: FloatArray  #: (a,) places of the forces in f
+    rows: IndexArray  #: (r,) places of the variables in w
+    columns: IndexArray  #: (a,) places of the forces in f
     S: FloatArray  #: (r, a)
     G: FloatArray  #: (a, r)
 
@@ -88,7 +88,7 @@ def coupled_solver(group: Group) -> Solver:
     return _convex_solver(group) if group.is_convex else _plain_solver(group)
 
 
-def _convex_solver(group: Group) -> Solver:
+def _convex_solver(group: Group) -> Solver:  # noqa: C901  # four closures over one group
     s, V = np.linalg.eigh(0.5 * (group.S + group.S.T))
     kept = s > RANK * s.max()
     s, V = s[kept], V[:, kept]
@@ -218,5 +218,5 @@ def _plain_solver(group: Group) -> Solver:
     return solve
 
 
-def _is_settled(step: FloatArray, w: FloatArray) -> bool:
+def _is_settled(step: np.ndarray, w: np.ndarray) -> bool:
     return bool((np.abs(step) <= SETTLED * np.abs(w).max(initial=0.0)).all())

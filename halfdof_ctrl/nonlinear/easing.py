@@ -62,7 +62,7 @@ def eased_answers(reduction: NonlinearReduction, tolerances: FloatArray) -> Answ
         if k in roots:
             rest = reduction.rests[k]
             roots[k] = _eased_root(roots[k], chord, rest)
-        places[k] = replace(place, element=replace(place.element, law=_eased_law(law, chord)))  # type: ignore[arg-type,call-arg]
+        places[k] = replace(place, element=replace(place.element, law=_eased_law(law, chord)))  # type: ignore[arg-type]
     if not changed:
         return reduction.answers
     geometry = replace(reduction.geometry, places=tuple(places))

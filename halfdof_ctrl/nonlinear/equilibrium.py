@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.arrays import FloatArray, IndexArray, read_only
 from halfdof_ctrl.base.errors import LawError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import Values
@@ -92,7 +92,7 @@ def _stiffness(reduction: "NonlinearReduction", K: FloatArray, q: FloatArray) ->
 
 
 def _newton(
-    reduction: "NonlinearReduction", K: FloatArray, load: FloatArray, q: FloatArray, free: FloatArray
+    reduction: "NonlinearReduction", K: FloatArray, load: FloatArray, q: FloatArray, free: IndexArray
 ) -> FloatArray | None:
     """Find q from a first guess; None if a stiffness is singular on the way or the steps do not settle."""
     left = _left_over(reduction, K, load, q)[free]
@@ -128,7 +128,7 @@ def _loose(tangent: FloatArray) -> bool:
 
 
 def _no_rest(
-    reduction: "NonlinearReduction", K: FloatArray, load: FloatArray, q: FloatArray, free: FloatArray
+    reduction: "NonlinearReduction", K: FloatArray, load: FloatArray, q: FloatArray, free: IndexArray
 ) -> LawError:
     dofs = reduction.model.dofs
     tangent = _stiffness(reduction, K, q)[np.ix_(free, free)]
@@ -137,11 +137,15 @@ def _no_rest(
         share = np.abs(right[-1])
         names = tuple([dofs[free[i]] for i in np.flatnonzero(share > 1e-6 * share.max())])
         msg = (
-            f"Nothing holds {listed(names)} at rest: no spring resists there (inside a gap, or at a damper alone), so the "
+            f"Nothing holds {listed(names)} at rest: no spring resists there (inside a gap, or at a damper alone), "
+            "so the "
             "equilibrium is not one point. Add a spring, or choose a load that closes the gap."
         )
         return LawError(msg, element="stiffness", dofs=names)
     left = np.abs(_left_over(reduction, K, load, q))
     worst = dofs[int(free[left[free].argmax()])]
-    msg = f"No equilibrium was found: {left[free].max():.3g} N is left over at {worst}. Its springs may not reach the load."
+    msg = (
+        f"No equilibrium was found: {left[free].max():.3g} N is left over at {worst}. Its springs may not reach the "
+        "load."
+    )
     return LawError(msg, element="equilibrium", dofs=(worst,))

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.model.elements import Element, Force, Spring
+from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words, split_actions
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -119,7 +119,8 @@ def geometry_of(model: NonlinearModel) -> Geometry:
         else:
             e = direction(element, dofs)
             still = np.zeros((1, n))
-            E, L_q, L_v = e[:, None], *((e[None], still) if isinstance(element, Spring) else (still, e[None]))
+            is_spring = isinstance(element, Spring)
+            E, L_q, L_v = e[:, None], e[None] if is_spring else still, still if is_spring else e[None]
         arguments, forces = slice(r, r + len(L_q)), slice(a, a + E.shape[1])
         place = Place(element=element, words=words, dofs=element_dofs(element), arguments=arguments, forces=forces)
         r, a = arguments.stop, forces.stop
@@ -147,9 +148,9 @@ def merged_elements(model: NonlinearModel) -> list[tuple[Element, str]]:
             found[key] = element, words
             continue
         first, named = found[key]
-        turned = first.a != element.a  # type: ignore[union-attr]  # keys of springs and dampers hold no Force
-        law = side_by_side(first.law, element.law, turned=turned)  # type: ignore[union-attr,arg-type]
-        found[key] = replace(first, law=law), f"{named} and {words}"  # type: ignore[type-var]
+        if isinstance(first, Spring | Damper) and isinstance(first.law, Law):  # keys of these hold nothing else
+            law = side_by_side(first.law, element.law, turned=first.a != element.a)
+            found[key] = type(first)(first.a, first.b, law), f"{named} and {words}"
     return list(found.values())
 
 

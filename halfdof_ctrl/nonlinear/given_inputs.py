@@ -44,7 +44,10 @@ def read_inputs(given: Any, names: tuple[str, ...], times: FloatArray) -> Inputs
         return _of_functions(parts, every, times, m)
     samples = np.array([np.broadcast_to(_numbers(part, times), times.shape) for part in parts]).reshape(m, times.size)
     if not np.isfinite(samples).all():
-        msg = f"inputs hold NaN or Inf ({names[int(np.argwhere(~np.isfinite(samples))[0, 0])]}): every value must be finite."
+        msg = (
+            f"inputs hold NaN or Inf ({names[int(np.argwhere(~np.isfinite(samples))[0, 0])]}): every value must be "
+            "finite."
+        )
         raise MatrixError(msg, matrix="inputs")
     return Inputs(
         at=joined(times, samples), samples=samples, kinks=_kinks(times, samples), largest=np.abs(samples).max(axis=1)
@@ -109,7 +112,7 @@ def _parts(given: Any, names: tuple[str, ...], times: FloatArray) -> list[Any]: 
     if array.shape == (m, times.size):
         return list(array)
     if array.shape == (m,) and m != times.size:
-        return array.tolist()
+        return list(array)
     raise _shape_error(array.shape, m, times)
 
 
@@ -122,7 +125,8 @@ def _ragged(given: Sequence[Any], m: int, times: FloatArray) -> npt.NDArray[Any]
 
 def _shape_error(shape: tuple[int, ...], m: int, times: FloatArray) -> MatrixError:
     msg = (
-        f"inputs have the shape {shape}, but there are {m} inputs and {times.size} times. Give a number, {m} x {times.size} "
+        f"inputs have the shape {shape}, but there are {m} inputs and {times.size} times. Give a number, {m} x "
+        f"{times.size} "
         "samples, a function of time, or one of these for each input by name."
     )
     return MatrixError(msg, matrix="inputs")

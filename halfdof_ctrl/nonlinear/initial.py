@@ -29,7 +29,8 @@ def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Valu
             x = np.full(N, float(x))
         if x.shape != (N,) or not np.isfinite(x).all():
             msg = (
-                f"A state of this model has {N} finite numbers, {', '.join(reduction.states)}, not the shape {x.shape}. "
+                f"A state of this model has {N} finite numbers, {', '.join(reduction.states)}, not the shape "
+                f"{x.shape}. "
                 "Give displacements and velocities by name."
             )
             raise MatrixError(msg, matrix="initial")

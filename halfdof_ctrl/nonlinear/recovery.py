@@ -20,19 +20,19 @@ def motion_at(
     reduction: "NonlinearReduction", t: float, x: FloatArray, u: FloatArray, u_dot: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return displacements and velocities of all n DOFs, equation (25)."""
-    signal = reduction.linear.displacement
+    signal: Any = reduction.linear.displacement  # a Signal: nonlinear models are dense
     w, d = reduction.solved(t, x, u)
     x_dot = reduction.A @ x + reduction.B @ u + reduction.B_d @ d
-    if not signal.U:  # type: ignore[union-attr]  # dense
-        return signal.X @ x, signal.X @ x_dot  # type: ignore[union-attr]
+    if not signal.U:
+        return signal.X @ x, signal.X @ x_dot
     inputs = np.concatenate([u, d])
-    direct, m = signal.U[0], u.size  # type: ignore[union-attr]
-    q = signal.X @ x + direct @ inputs  # type: ignore[union-attr]
-    v = signal.X @ x_dot + direct[:, :m] @ u_dot  # type: ignore[union-attr]
+    direct, m = signal.U[0], u.size
+    q = signal.X @ x + direct @ inputs
+    v = signal.X @ x_dot + direct[:, :m] @ u_dot
     if direct[:, m:].any():
         w_dot = reduction.X_w @ x_dot + reduction.U_w @ u_dot
         v = v - direct[:, m:] @ (feedback_of_elements(reduction, t, w, singular="drop") @ w_dot)
-    for power, part in enumerate(signal.U[1:], start=1):  # type: ignore[union-attr]
+    for power, part in enumerate(signal.U[1:], start=1):
         if power == 1:
             q = q + part[:, :m] @ u_dot
     return q, v

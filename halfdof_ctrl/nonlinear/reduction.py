@@ -14,18 +14,16 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.base.errors import ImproperError, LawError, NoAnswerError, SingularPencilError
+from halfdof_ctrl.base.errors import ImproperError, LawError, NoAnswerError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import NonlinearModel, Values, reduced
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.answers import Answers, UnansweredError, answers_of, components
 from halfdof_ctrl.nonlinear.classification import (
-    generic_slopes,
     made_by_elements,
     moving_places,
     partition_of,
     require_index_one,
-    SEEDS,
 )
 from halfdof_ctrl.nonlinear.geometry import Geometry, Place, geometry_of
 from halfdof_ctrl.nonlinear.judgement import judged
@@ -126,7 +124,6 @@ class NonlinearReduction:
         return equilibrium_of(self, inputs)
 
 
-@reduced.register
 @lru_cache(maxsize=32)
 def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
     """Reduce a nonlinear model; the last ones are remembered, since models are frozen.
@@ -147,7 +144,7 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
     moving = moving_places(geometry, partition)  # type: ignore[arg-type]  # index 1 was required
     for _ in range(2):  # the second time without tangents where an element does not move its own variables
         kept = [G if moves else 0.0 * G for G, moves in zip(slopes, moving, strict=True)]
-        linear, output, w = _linear_part(model, base, geometry, kept)
+        linear, output, w = _linear_part(base, geometry, kept)
         S = w.direct(m + a)[:, m:].copy()
         following = [
             moves and not _moves_itself(S, G, place)
@@ -162,7 +159,7 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
             S[place.arguments, place.forces] = 0.0
             if np.abs(S[place.arguments]).max(initial=0.0) <= UNMOVED * np.abs(w.X[place.arguments]).max(initial=0.0):
                 S[place.arguments] = 0.0
-    rests, roots = _alone(base, geometry, S, kept, moving, needed)
+    rests, roots = _alone(geometry, S, kept, moving, needed)
     return NonlinearReduction(
         model=model,
         geometry=geometry,
@@ -183,8 +180,11 @@ def reduce_nonlinear(model: NonlinearModel) -> NonlinearReduction:
     )
 
 
+reduced.register(NonlinearModel, reduce_nonlinear)
+
+
 def _linear_part(
-    model: NonlinearModel, base: SecondOrderModel, geometry: Geometry, slopes: list[FloatArray]
+    base: SecondOrderModel, geometry: Geometry, slopes: list[FloatArray]
 ) -> tuple[ExactReduction, Signal, Signal]:
     """Reduce the model with tangents, the inputs (u, d) and the outputs (y, w)."""
     tangent = geometry.with_slopes(base, slopes)
@@ -194,6 +194,10 @@ def _linear_part(
     inner = [
         f"force of {place.words}" for place in geometry.places for _ in range(place.forces.start, place.forces.stop)
     ]
+    fed: dict[str, Any] = {
+        letter: read_only(np.block([[getattr(base, letter), block], [np.zeros((r, m + a))]]))
+        for letter, block in (("D", -geometry.R), ("Dv", np.zeros((p, a))), ("Da", np.zeros((p, a))))
+    }
     wide = replace(
         tangent,
         B=read_only(np.hstack([base.B, geometry.E])),
@@ -202,24 +206,26 @@ def _linear_part(
         F=read_only(np.vstack([tangent.F, geometry.L_q])),
         G=read_only(np.vstack([tangent.G, geometry.L_v])),
         H=read_only(np.vstack([base.H, still])),
-        **{
-            letter: read_only(np.block([[getattr(base, letter), fed], [np.zeros((r, m + a))]]))
-            for letter, fed in (("D", -geometry.R), ("Dv", np.zeros((p, a))), ("Da", np.zeros((p, a))))
-        },
+        **fed,
         inputs=(*base.inputs, *[f"{name} [{i}]" for i, name in enumerate(inner)]),
         outputs=(*base.outputs, *[f"w[{i}]" for i in range(r)]),
     )
     linear = exact_reduction(wide)
     if linear.method == "deflation":
         words = listed([place.words for place in geometry.places])
-        msg = f"With {words} the model is of index {linear.index}, and a nonlinear model must be of index 1. Eliminate the constraint."
+        msg = (
+            f"With {words} the model is of index {linear.index}, and a nonlinear model must be of index 1. "
+            "Eliminate the "
+            "constraint."
+        )
         raise LawError(msg, element=words, dofs=base.dofs)
     output = linear.output
     improper = [i for part in output.U[1:] for i in np.flatnonzero(part[p:].any(axis=1)).tolist()]
     if improper:
         place = next(one for one in geometry.places if one.arguments.start <= improper[0] < one.arguments.stop)
         msg = (
-            f"{place.words} follows the derivative of an input: it sits on {listed(place.dofs)}, whose motion jumps with the "
+            f"{place.words} follows the derivative of an input: it sits on {listed(place.dofs)}, whose motion "
+            "jumps with the "
             "input. Prescribe the acceleration instead of the displacement, or filter the input."
         )
         raise ImproperError(msg, pairs=tuple([(name, place.words, 1) for name in base.inputs]))
@@ -232,7 +238,6 @@ def _moves_itself(S: FloatArray, G: FloatArray, place: Place) -> bool:
 
 
 def _alone(
-    base: SecondOrderModel,
     geometry: Geometry,
     S: FloatArray,
     slopes: list[FloatArray],
@@ -255,7 +260,8 @@ def _alone(
         whole = law.beside(rest) if law.beside is not None else law  # type: ignore[union-attr]
         if own <= 0.0 or (rest < 0.0 and not (law.beside is not None and judged(whole).answers_all)):  # type: ignore[union-attr,arg-type]
             msg = (
-                f"{place.words} is solved for beside a stiffness or damping of {rest:.3g}, which is negative: several motions "
+                f"{place.words} is solved for beside a stiffness or damping of {rest:.3g}, which is negative: "
+                "several motions "
                 "may answer the same force. Give the DOF a mass, or take the negative part into the law."
             )
             raise LawError(msg, element=place.words, dofs=place.dofs)
@@ -270,7 +276,8 @@ def no_answer(reduction: NonlinearReduction, cause: UnansweredError, t: float, x
     what = "its law gives NaN or Inf" if not np.isfinite(force) else f"a force of {force:.6g} N has no answering motion"
     shown = listed([f"{name} = {value:.6g}" for name, value in zip(reduction.states, x.tolist(), strict=True)])
     msg = (
-        f"At t = {t:.6g} s {place.words} on {listed(dofs)} stops the run: {what}. State reached: {shown}. See whether the law "
+        f"At t = {t:.6g} s {place.words} on {listed(dofs)} stops the run: {what}. State reached: {shown}. See "
+        "whether the law "
         "is bounded, falls, or is known only within its table there."
     )
     return NoAnswerError(

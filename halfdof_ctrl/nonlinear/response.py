@@ -1,8 +1,8 @@
 """Simulate a nonlinear model, with defaults that can be trusted.
 
 The state equation (22) goes to a solver of scipy with a relative tolerance of 1e-8 and absolute ones of rtol times the
-size of each state, which a first coarse run measures. Laws whose inverse has an infinite slope (a square damper at rest)
-come to rest in finite time; they are eased below the tolerance (`easing`), or a solver would crawl there.
+size of each state, which a first coarse run measures. Laws whose inverse has an infinite slope (a square damper at
+rest) come to rest in finite time; they are eased below the tolerance (`easing`), or a solver would crawl there.
 """
 
 import math
@@ -27,10 +27,10 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.model.nonlinear import NonlinearModel, Values
+from halfdof_ctrl.nonlinear.answers import UnansweredError
 from halfdof_ctrl.nonlinear.easing import eased_answers
 from halfdof_ctrl.nonlinear.given_inputs import Inputs, joined, read_inputs
 from halfdof_ctrl.nonlinear.initial import initial_state
-from halfdof_ctrl.nonlinear.answers import UnansweredError
 from halfdof_ctrl.nonlinear.reduction import NonlinearReduction, no_answer, reduce_nonlinear
 from halfdof_ctrl.nonlinear.system import require_proper
 
@@ -112,7 +112,8 @@ def nonlinear_response(
     states, reached = run.integrate(x_0, step, tolerances, method, show=None)
     if reached < times.size:
         msg = (
-            f"The simulation was stopped at t = {times[reached - 1]:.6g} s: {reached} of {times.size} times are done, and "
+            f"The simulation was stopped at t = {times[reached - 1]:.6g} s: {reached} of {times.size} times are "
+            "done, and "
             "the response ends there."
         )
         warnings.warn(msg, InterruptedResponseWarning, stacklevel=callers_level())
@@ -196,8 +197,10 @@ class _Run:
         words = ", ".join([place.words for place in places])
         dofs = tuple(dict.fromkeys(name for place in places for name in place.dofs))
         msg = (
-            f"The solver stops at t = {t:.6g} s ({message or 'a state is no finite number'}) with {words}; state reached: "
-            f"{x.tolist()}. The motion may grow without bound in finite time, or a law jump; look at it with another method."
+            f"The solver stops at t = {t:.6g} s ({message or 'a state is no finite number'}) with {words}; state "
+            "reached: "
+            f"{x.tolist()}. The motion may grow without bound in finite time, or a law jump; look at it with "
+            "another method."
         )
         return NoAnswerError(msg, element=words, dofs=dofs, time=float(t), force=math.nan, state=tuple(x.tolist()))
 

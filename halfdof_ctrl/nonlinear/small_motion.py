@@ -74,7 +74,8 @@ def feedback_of_elements(
 def infinite_slope(words: str, dofs: tuple[str, ...], fact: str) -> LawError:
     """Make the refusal of a linearization where a slope is infinite."""
     msg = (
-        f"No linear state space describes small motions here: {words} acts on {listed(dofs)}, and {fact}. Linearize where "
+        f"No linear state space describes small motions here: {words} acts on {listed(dofs)}, and {fact}. "
+        "Linearize where "
         "it moves, give the law a linear part, or take tangent(), which drops the state."
     )
     return LawError(msg, element=words, dofs=dofs)

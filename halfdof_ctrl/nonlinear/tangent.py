@@ -49,8 +49,10 @@ def _warn_of_lost_states(reduction: "NonlinearReduction", model: SecondOrderMode
     dofs = tuple(dict.fromkeys(name for place in flat for name in place.dofs))
     what = f"without the state {listed(lost)}" if lost else "with other DOFs held than in the model"
     msg = (
-        f"The slope of {words} is zero at this state, so the tangent of {listed(dofs)} is {what}: the nonlinear model has "
-        f"{len(reduction.states)} states, the tangent another structure. Take the tangent where it moves, or give the law "
+        f"The slope of {words} is zero at this state, so the tangent of {listed(dofs)} is {what}: the nonlinear "
+        "model has "
+        f"{len(reduction.states)} states, the tangent another structure. Take the tangent where it moves, or give "
+        "the law "
         "a linear part."
     )
     warnings.warn(msg, LostStateWarning, stacklevel=callers_level())

@@ -1,5 +1,6 @@
 """Simulation: against closed forms, an independent integration, energy balances, and what stops a run."""
 
+# ruff: noqa: ARG005  # forces have three arguments whatever they use
 import control
 import numpy as np
 import pytest
@@ -171,7 +172,7 @@ def test_a_force_of_the_user_is_a_pendulum() -> None:
     """``q'' + g sin q = 0``: energy is kept, and the period is an elliptic integral."""
     g, start = 9.81, 1.2
     free = mechss([[1.0]], None, [[0.0]])
-    model = nlmechss(free, Force(lambda q, v, t: g * np.sin(q), displacements="q0"))  # noqa: ARG005
+    model = nlmechss(free, Force(lambda q, v, t: g * np.sin(q), displacements="q0"))
     period = 4.0 * ellipk(np.sin(start / 2) ** 2) / np.sqrt(g)
     x = nonlinear_response(model, [0, period / 2, period], initial={"q0": start}).outputs
     assert_allclose(x, [start, -start, start], rtol=1e-7)
@@ -184,7 +185,7 @@ def test_a_force_on_the_rate_of_a_half_dof_is_solved_for() -> None:
         lambda q, v, t: 1e4 * np.abs(v) * v + 30 * v,
         velocities="y2",
         jacobian=lambda q, v, t: (np.zeros((1, 0)), np.diag(2e4 * abs(v) + 30)),
-    )  # noqa: ARG005
+    )
     by_force = nlmechss(hd.hydromount(C_h=0).select("F_y", ["y", "y2"]), oil)
     ours = nonlinear_response(by_force, times, u).outputs
     by_law = nonlinear_response(oil_mount(outputs=("y", "y2")), times, u).outputs

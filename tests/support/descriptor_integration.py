@@ -33,10 +33,10 @@ def integrated(
     times: np.ndarray,
     inputs: Callable[[float], Any],
     size: float,
-    q_0: Any = None,
-    v_0: Any = None,
+    q_0: np.ndarray | None = None,
+    v_0: np.ndarray | None = None,
     longest: float = 0.0,
-    rate_0: Any = None,
+    rate_0: np.ndarray | None = None,
 ) -> np.ndarray:
     """Give the displacements (n, k) of all DOFs; `size` is a displacement below which nothing matters much."""
     M, C, K, B = (np.asarray(matrix, dtype=float) for matrix in matrices)
