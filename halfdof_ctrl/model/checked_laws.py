@@ -46,6 +46,7 @@ def check_force(force: Force, element: str) -> None:
     values = _tried(
         lambda at: force.function(at[: q.size], at[q.size :], 0.0), np.concatenate([q, v]), "law", element, force.on
     )
+    values = np.reshape(values, shape) if np.ndim(values) == 0 and shape == (1,) else values
     _check_values(values, shape, "law", element, force.on)
     if not np.isfinite(np.asarray(values, dtype=float)).all():
         msg = f"The law of {element} gives {values} at zero, where every motion begins. Define it there."

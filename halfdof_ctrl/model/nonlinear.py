@@ -1,6 +1,6 @@
 """The nonlinear model: M, C, K with springs, dampers and forces whose laws are not linear.
 
-    M q'' + C q' + K q + sum of e_k phi_k = B u,    y = F q + G q' + H q'' + D u                   (20)
+    M q'' + C q' + K q + sum of e_k phi_k = B u,    y = F q + G q' + H q'' + D u                   (N1)
 
 The model is plain data. What its DOFs are, how it moves and what its tangent is comes from the room `nonlinear`, which
 registers itself with `reduced` here, so that imports point down. Derivation: docs/explanation/nonlinear.md.
@@ -223,7 +223,7 @@ def nlmechss(
         A real, dense model of up to 500 DOFs; its signals are those of the nonlinear one. Motions are prescribed
         before: ``model.prescribe_motion("base", "acceleration")`` keeps the base as a DOF.
     elements : sequence of Spring, Damper and Force
-        What acts besides M, C and K, on the left of equation (20).
+        What acts besides M, C and K, on the left of equation (N1).
     name : str, optional
         By default that of `model`.
 
@@ -305,7 +305,7 @@ def element_dofs(element: Element) -> tuple[str, ...]:
 
 
 def direction(element: Spring | Damper, dofs: tuple[str, ...]) -> FloatArray:
-    """Return e of equation (20): 1 at a, -1 at b."""
+    """Return e of equation (N1): 1 at a, -1 at b."""
     e = np.zeros(len(dofs))
     e[dofs.index(element.a)] = 1.0
     if element.b is not None:

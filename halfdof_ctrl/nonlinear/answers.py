@@ -1,12 +1,12 @@
 """Find the motions that answer the forces: ``w + S (f(w) - G w) = w_0(x, u)``, group by group.
 
-    w = w_0 + S d,    d = -(f(w, t) - G w)                                                         (22)
+    w = w_0 + S d,    d = -(f(w, t) - G w)                                                         (N3)
 
 d is what the elements do beyond the generic tangents G that the linear part holds. Variables that are states need no
 solving; the others fall into groups, the strong components of S, which follow one another. A group of one spring or
 damper is a scalar equation of a law that rises, with 1/S = G + rest:
 
-    f(w) + rest w = w_0 / S                                                                        (23)
+    f(w) + rest w = w_0 / S                                                                        (N4)
 
 A group of several is solved by `coupled`. Nothing is remembered between calls: equal arguments give equal results.
 """
@@ -46,7 +46,7 @@ class Answers:
     groups: tuple[tuple[int, ...], ...]  #: places of each step that solves, in their order
 
     def solve(self, t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return w and d of equation (22).
+        """Return w and d of equation (N3).
 
         Raises
         ------
@@ -72,13 +72,13 @@ def answers_of(
     ----------
     geometry : Geometry
     S : (r, a) ndarray
-        Of equation (22); rows of elements on states are zero.
+        Of equation (N3); rows of elements on states are zero.
     slopes : sequence of ndarray
         G of each element, zero where it is on states.
     moving : sequence of bool
         Whether the element's variables must be solved for.
     roots : dict
-        The solution of (23), as a function of w_0 / S, for every spring and damper that stands alone.
+        The solution of (N4), as a function of w_0 / S, for every spring and damper that stands alone.
     """
     places = geometry.places
     on_states = [k for k in range(len(places)) if not moving[k] and not S[places[k].arguments].any()]
@@ -155,7 +155,7 @@ def _following(place: Place, G: FloatArray, S: FloatArray) -> Step:
 
 
 def _alone(place: Place, S: FloatArray, root: Root) -> Step:
-    """Solve (23) for one spring or damper."""
+    """Solve (N4) for one spring or damper."""
     row, column = place.arguments.start, place.forces.start
     own = float(S[row, column])
     others = np.array(S[row])
@@ -176,7 +176,7 @@ def _alone(place: Place, S: FloatArray, root: Root) -> Step:
 
 
 def _together(group: Group, S: FloatArray, places: list[Place]) -> Step:
-    """Solve (22) for several elements at once."""
+    """Solve (N3) for several elements at once."""
     solve = coupled_solver(group)
     outside = np.array(S[group.rows])
     outside[:, group.columns] = 0.0

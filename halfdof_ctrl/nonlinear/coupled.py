@@ -1,12 +1,12 @@
 """Several elements that must be solved for together.
 
-    w + S (f(w) - G w) = w_0,    y = (V' (w - w_0)),    S = V diag(s) V'                           (24)
+    w + S (f(w) - G w) = w_0,    y = (V' (w - w_0)),    S = V diag(s) V'                           (N5)
 
 Where S is symmetric positive semidefinite and every law rises, w = w_0 + V y is where the convex function
 
     h(y) = y' diag(1/s) y / 2 + sum of (F_k(w_k) - G_k w_k^2 / 2),    F_k' = f_k
 
-has its least value: its gradient is (24), its Hessian ``diag(1/s) + V' (D - G) V`` that of springs and dampers in
+has its least value: its gradient is (N5), its Hessian ``diag(1/s) + V' (D - G) V`` that of springs and dampers in
 parallel, so there is one solution at most, and exactly one where the laws are onto. Newton's method with a search
 along each step, whose derivative rises, finds it; where a slope is zero or infinite and Newton stands still, one
 variable after the other is solved for inside its bracket, which lowers h at every turn. Elsewhere damped Newton.
@@ -84,7 +84,7 @@ class Group:
 
 
 def coupled_solver(group: Group) -> Solver:
-    """Return the function that solves (24) for w and d, given t and w_0; None where it finds no answer."""
+    """Return the function that solves (N5) for w and d, given t and w_0; None where it finds no answer."""
     return _convex_solver(group) if group.is_convex else _plain_solver(group)
 
 

@@ -1,6 +1,6 @@
 """The state of rest under constant inputs: Newton's method on the static equation.
 
-K q + sum over springs of e phi(e' q) + forces at rest = B u                                    (27)
+K q + sum over springs of e phi(e' q) + forces at rest = B u                                    (N8)
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,6 @@
 """Where the elements of a nonlinear model sit: what they depend on and what they act on.
 
-    w = L_q q + L_v q'                                                                             (21)
+    w = L_q q + L_v q'                                                                             (N2)
     M q'' + C q' + K q + E f(w, t) = B u
 
 A spring has one row of L_q, a damper one of L_v, and both the column e of E; a `Force` has a row for each motion that

@@ -1,6 +1,6 @@
 """The motion of all DOFs from the state: displacements, and velocities by the chain rule.
 
-q = X x + U u + U_d d,    q' = X x' + U u' + U_d d',    d' = -D (1 + S D)^-1 w_0',    D = f' - G         (25)
+q = X x + U u + U_d d,    q' = X x' + U u' + U_d d',    d' = -D (1 + S D)^-1 w_0',    D = f' - G         (N6)
 """
 
 from typing import TYPE_CHECKING, Any
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def motion_at(
     reduction: "NonlinearReduction", t: float, x: FloatArray, u: FloatArray, u_dot: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return displacements and velocities of all n DOFs, equation (25)."""
+    """Return displacements and velocities of all n DOFs, equation (N6)."""
     signal: Any = reduction.linear.displacement  # a Signal: nonlinear models are dense
     w, d = reduction.solved(t, x, u)
     x_dot = reduction.A @ x + reduction.B @ u + reduction.B_d @ d

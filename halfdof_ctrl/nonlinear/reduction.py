@@ -1,6 +1,6 @@
 """The reduction of a nonlinear model: a linear one whose extra inputs are what the elements do beyond their tangents.
 
-    x' = A x + B u + B_d d,    w = X_w x + U_w u + S d,    d = -(f(w, t) - G w)                     (22)
+    x' = A x + B u + B_d d,    w = X_w x + U_w u + S d,    d = -(f(w, t) - G w)                     (N3)
 
 A, B, B_d, X_w, U_w and S come from one exact reduction of the model with generic tangents G where elements must be
 solved for, and with none where they hang on states. So every structure that the linear reduction takes at index 1 is
@@ -40,15 +40,15 @@ LEAST_REST = 1e-10  #: of G; what holds a DOF beside its element by less is roun
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class NonlinearReduction:
-    """Equation (22) for N states, m inputs, r variables w, a forces d and p outputs."""
+    """Equation (N3) for N states, m inputs, r variables w, a forces d and p outputs."""
 
     model: NonlinearModel
     geometry: Geometry
     linear: ExactReduction  #: of the model with the tangents G and the inputs (u, d)
     moving: tuple[bool, ...]  #: for each element, whether its variables are solved for
     slopes: tuple[FloatArray, ...]  #: G of each element
-    rests: dict[int, float]  #: what holds beside an element that stands alone, in the units of its slope; (23)
-    roots: dict[int, Root]  #: solution of (23) for these
+    rests: dict[int, float]  #: what holds beside an element that stands alone, in the units of its slope; (N4)
+    roots: dict[int, Root]  #: solution of (N4) for these
     answers: Answers
     A: FloatArray  #: (N, N)
     B: FloatArray  #: (N, m)
@@ -88,16 +88,9 @@ class NonlinearReduction:
             raise no_answer(self, cause, t, x) from cause
 
     def rate(self, t: float, x: FloatArray, u: FloatArray) -> FloatArray:
-        """Return x' of equation (22)."""
+        """Return x' of equation (N3)."""
         _, d = self.solved(t, x, u)
         return np.asarray(self.A @ x + self.B @ u + self.B_d @ d)
-
-    def outputs(self, t: float, x: FloatArray, u: FloatArray) -> FloatArray:
-        """Return y."""
-        _, d = self.solved(t, x, u)
-        m = u.size
-        direct = self.output.direct(m + d.size)
-        return np.asarray(self.output.X @ x + direct[:, :m] @ u + direct[:, m:] @ d)
 
     def state(self, initial: Values, inputs: Values) -> FloatArray:
         """Return the state for given displacements and velocities."""
@@ -244,7 +237,7 @@ def _alone(
     moving: list[bool],
     needed: list[bool],
 ) -> tuple[dict[int, float], dict[int, Root]]:
-    """Find 1/S - G and the root of (23) for every spring or damper that stands alone."""
+    """Find 1/S - G and the root of (N4) for every spring or damper that stands alone."""
     rests: dict[int, float] = {}
     roots: dict[int, Root] = {}
     for group in components(geometry, S, moving):

@@ -1,12 +1,13 @@
 """Simulate a nonlinear model, with defaults that can be trusted.
 
-The state equation (22) goes to a solver of scipy with a relative tolerance of 1e-8 and absolute ones of rtol times the
+The state equation (N3) goes to a solver of scipy with a relative tolerance of 1e-8 and absolute ones of rtol times the
 size of each state, which a first coarse run measures. Laws whose inverse has an infinite slope (a square damper at
 rest) come to rest in finite time; they are eased below the tolerance (`easing`), or a solver would crawl there.
 """
 
 import math
 import warnings
+from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -166,7 +167,7 @@ class _Run:
         done = 1
         if x.size == 0 or self.times.size == 1:
             return states, self.times.size
-        ends = [*self.kinks, float(self.times[-1])]
+        ends, grid = [*self.kinks, float(self.times[-1])], self.times.tolist()
         start, span = float(self.times[0]), float(self.times[-1] - self.times[0])
         shown = 0
         try:
@@ -177,10 +178,10 @@ class _Run:
                     )
                     while solver.status == "running":
                         message = solver.step()
-                        if solver.status == "failed" or not np.isfinite(solver.y).all():
+                        if solver.status == "failed" or not math.isfinite(solver.y.sum()):
                             raise self._stalled(solver.t, solver.y, str(message))
-                        upto = int(np.searchsorted(self.times, solver.t, side="right"))
-                        if upto > done:
+                        if done < len(grid) and solver.t >= grid[done]:
+                            upto = bisect_right(grid, solver.t)
                             states[:, done:upto] = solver.dense_output()(self.times[done:upto])
                             done = upto
                         here = int(BAR_STEPS * (solver.t - float(self.times[0])) / span)
@@ -240,11 +241,18 @@ def _response(
 ) -> control.TimeResponseData:
     model = reduction.model
     u = np.array([forcing.at(float(t)) for t in times]).T.reshape(len(model.inputs), times.size)
-    y = np.array([reduction.outputs(float(t), states[:, k], u[:, k]) for k, t in enumerate(times)]).T
+    m = u.shape[0]
+    direct = reduction.output.direct(m + reduction.B_d.shape[1])
+    y = reduction.output.X @ states + direct[:, :m] @ u
+    if direct[:, m:].any():
+        y += (
+            direct[:, m:]
+            @ np.array([reduction.solved(float(t), states[:, k], u[:, k])[1] for k, t in enumerate(times)]).T
+        )
     name = control_label(model.name or "nonlinear model")
     return control.TimeResponseData(
         times,
-        y.reshape(len(model.outputs), times.size),
+        y,
         states,
         u,
         issiso=len(model.inputs) == len(model.outputs) == 1,

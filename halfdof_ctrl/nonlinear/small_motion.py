@@ -1,6 +1,6 @@
 """Small motions about a state: the elements' forces as a linear function of the variables that the linear part gives.
 
-    d = -D (1 + S D)^-1 w_0,    D = f'(w) - G                                                       (26)
+    d = -D (1 + S D)^-1 w_0,    D = f'(w) - G                                                       (N7)
 
 Where an element alone holds a DOF and its slope is zero, 1 + S D is singular: the slope of the inverse is infinite.
 """
@@ -23,7 +23,7 @@ SINGULAR = 1e-13  #: reciprocal condition of 1 + S D in a group, below which it 
 def feedback_of_elements(
     reduction: "NonlinearReduction", t: float, w: FloatArray, *, singular: Literal["refuse", "drop"] = "refuse"
 ) -> FloatArray:
-    """Return the (a, r) matrix ``D (1 + S D)^-1`` of equation (26).
+    """Return the (a, r) matrix ``D (1 + S D)^-1`` of equation (N7).
 
     Parameters
     ----------

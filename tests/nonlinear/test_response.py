@@ -31,7 +31,7 @@ ENERGY = 1e-6  #: of the energy that went in
 @pytest.mark.parametrize("kind", ["step", "sweep", "road"])
 @pytest.mark.parametrize("law", [laws.quadratic(1e4), laws.quadratic(1e4, 30), laws.coulomb(5, 0.002, 20)], ids=repr)
 def test_the_mount_moves_as_its_descriptor_form(kind: str, law: Law) -> None:
-    """Equation (22) by LSODA against (20) by IDA, fully implicit; the same piecewise linear force for both."""
+    """Equation (N3) by LSODA against (N1) by IDA, fully implicit; the same piecewise linear force for both."""
     times, u = inputs(kind, 2.0)
     model = oil_mount(law)
     ours = nonlinear_response(model, times, u).outputs
