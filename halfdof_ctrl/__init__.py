@@ -1,5 +1,6 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
+from halfdof_ctrl import laws
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -7,8 +8,13 @@ from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files.models import inspect_files, load_model, save_model
 from halfdof_ctrl.files.systems import load_system, save_system
 from halfdof_ctrl.files.tables import save_response
+from halfdof_ctrl.model.elements import Damper, Force, Spring
+from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.nonlinear.response import nonlinear_response
+from halfdof_ctrl.nonlinear.system import mech2nlsys
 from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import (
     bode_plot,
@@ -33,10 +39,15 @@ __version__ = "0.1.0"
 
 __all__ = [
     "CrossCheck",
+    "Damper",
     "ExactReduction",
+    "Force",
     "HalfdofError",
+    "Law",
+    "NonlinearModel",
     "PencilStructure",
     "SecondOrderModel",
+    "Spring",
     "StateFeedback",
     "SweepFailure",
     "SweepResult",
@@ -50,11 +61,15 @@ __all__ = [
     "frequency_response",
     "hydromount",
     "inspect_files",
+    "laws",
     "load_model",
     "load_system",
     "lqr",
+    "mech2nlsys",
     "mech2ss",
     "mechss",
+    "nlmechss",
+    "nonlinear_response",
     "pencil_structure",
     "pole_map_plot",
     "save_model",
