@@ -2,8 +2,11 @@
 
 import math
 
+import numpy as np
+
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.parts.links import Link, linked
 
 
 def hydromount(
@@ -15,8 +18,22 @@ def hydromount(
     K_s: float = 500.0,
     C_rs: float = 100.0,
     C_h: float = 300.0,
+    ports: bool = False,
 ) -> SecondOrderModel:
     """Model a hydroelastic engine mount and the mass that it carries.
+
+    ::
+
+             y  [ m ]
+          +-----+-----+
+          |     |     |
+          |   C_rs   K_v
+         K_r    |     |
+          |    (y1)  (y2)         y1, y2: nodes without mass, half DOFs
+          |     |     |
+          |   K_rs  +-+--+
+          |     |  K_s  C_h
+         -+-----+---+----+--      ground
 
     DOF ``y`` is the mass on top, ``y1`` the node between the damper C_rs and the spring K_rs of the
     rubber, ``y2`` the node between the oil's spring K_v and the lower chamber. ``y1`` and ``y2`` have no
@@ -37,6 +54,9 @@ def hydromount(
         Stiffness of the secondary rubber [N/m].
     C_h : float
         Damping of the oil's flow through the holes [N s/m].
+    ports : bool
+        Whether what stands on the ground here is a port, so that the mount is a part for `halfdof_ctrl.assemble` with
+        the names of all mounts: ``top`` (y), ``bottom`` (the ground), ``1`` (y1), ``2`` (y2).
 
     Returns
     -------
@@ -66,6 +86,8 @@ def hydromount(
         if not (math.isfinite(value) and value >= 0.0):
             msg = f"{symbol} = {value}, but a stiffness [N/m] or damping [N s/m] must be a number that is not negative."
             raise ParameterError(msg, parameter=symbol, value=value)
+    if ports:
+        return _between_ports(m, {"K_r": K_r, "K_rs": K_rs, "K_v": K_v, "K_s": K_s, "C_rs": C_rs, "C_h": C_h})
     return mechss(
         [[m, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
         [[C_rs, -C_rs, 0.0], [-C_rs, C_rs, 0.0], [0.0, 0.0, C_h]],
@@ -73,3 +95,18 @@ def hydromount(
         dofs=("y", "y1", "y2"),
         name="hydromount",
     )
+
+
+def _between_ports(m: float, sizes: dict[str, float]) -> SecondOrderModel:
+    """Give the same mount with its ground as the DOF `bottom`."""
+    ends = {
+        "K_r": ("top", "bottom"),
+        "K_rs": ("1", "bottom"),
+        "K_v": ("top", "2"),
+        "K_s": ("2", "bottom"),
+        "C_rs": ("top", "1"),
+        "C_h": ("2", "bottom"),
+    }
+    links = [Link("K" if key[0] == "K" else "C", *pair, {"": sizes[key]}) for key, pair in ends.items()]
+    part = linked(("top", "bottom", "1", "2"), links, ("",), "hydromount")
+    return mechss(np.diag([m, 0.0, 0.0, 0.0]), part.C, part.K, dofs=part.dofs, name=part.name)
