@@ -203,7 +203,7 @@ def _check_ends(kind: str, a: object, b: object) -> None:
 def _checked_law(kind: str, a: str, b: str | None, law: Any) -> Law | float:  # noqa: ANN401  # whatever the user gave
     if isinstance(law, Law):
         return law
-    if isinstance(law, Real) and not isinstance(law, bool) and math.isfinite(law):
+    if isinstance(law, Real) and math.isfinite(law):
         return float(law)
     hint = (
         " Wrap a function as Law(function)." if callable(law) else " Give law=, a number or one of halfdof_ctrl.laws."

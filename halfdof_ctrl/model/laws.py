@@ -186,16 +186,12 @@ def gap(k: float, upper: float, lower: float | None = None) -> Law:
     """
     (a,) = _numbers(gap, k=k)
     above, below = float(upper), float(upper if lower is None else lower)
-    if (
-        a < 0.0
-        or math.isnan(above)
-        or math.isnan(below)
-        or above + below < 0.0
-        or math.isinf(above) > math.isinf(below)
-    ):
+    overlap = not above + below >= 0.0  # NaN too
+    if a < 0.0 or overlap or math.isinf(above):
         msg = (
-            f"gap: k = {k}, upper = {upper}, lower = {lower}, but a stop needs a stiffness that is not negative and a way "
-            "to it of at least minus that to the other stop; for a stop on the negative side alone turn the element round."
+            f"gap: k = {k}, upper = {upper}, lower = {lower}, but a stop needs a stiffness that is not negative, a "
+            "finite way to it, and one to the other stop that does not overlap. For a stop on the negative side alone, "
+            "turn the element round."
         )
         raise ParameterError(msg, parameter="gap", value=(k, upper, lower))
     left, right = (0.0 if math.isinf(below) or not a else -math.inf), (math.inf if a else 0.0)

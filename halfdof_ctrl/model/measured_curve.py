@@ -80,7 +80,8 @@ def _checked(x: npt.ArrayLike, f: npt.ArrayLike, extend: object) -> tuple[FloatA
         msg = f"table: x and f must be real numbers ({cause})."
         raise ParameterError(msg, parameter="table", value=None) from cause
     if points.ndim != 1 or points.shape != values.shape or points.size < FEWEST:
-        msg = f"table: x and f must be two rows of the same {FEWEST} or more numbers, not {points.shape} and {values.shape}."
+        shapes = f"{points.shape} and {values.shape}"
+        msg = f"table: x and f must be two rows of the same {FEWEST} or more numbers, not of shapes {shapes}."
         raise ParameterError(msg, parameter="table", value=points.shape)
     if not (np.isfinite(points).all() and np.isfinite(values).all() and (np.diff(points) > 0.0).all()):
         msg = (
