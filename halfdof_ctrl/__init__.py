@@ -1,11 +1,14 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
-from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
-from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure, zeros
-from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.base.errors import HalfdofError
-from halfdof_ctrl.files.models import inspect_files, load_model, load_system, save_model, save_response, save_system
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
+from halfdof_ctrl.descriptor.zeros import zeros
+from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.files.models import inspect_files, load_model, save_model
+from halfdof_ctrl.files.systems import load_system, save_system
+from halfdof_ctrl.files.tables import save_response
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import (
     bode_plot,
@@ -15,14 +18,16 @@ from halfdof_ctrl.plots import (
     sweep_plot,
     transmissibility_plot,
 )
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
 from halfdof_ctrl.report import write_report
+from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
+from halfdof_ctrl.sweeps.sweep import sweep
+from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness, transmissibility
-from halfdof_ctrl.sweeps.sweep import sweep
-from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
-from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
 
 __version__ = "0.1.0"
 

@@ -13,13 +13,13 @@ from datetime import UTC, datetime
 import control
 import numpy as np
 
-from halfdof_ctrl.systems.crosscheck import STEP_TOLERANCE, TRANSFER_TOLERANCE, CrossCheck
-from halfdof_ctrl.design.lqr import StateFeedback
-from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalues_in_words
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import listed, name_from_label
+from halfdof_ctrl.design.lqr import StateFeedback
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.crosscheck import STEP_TOLERANCE, TRANSFER_TOLERANCE, CrossCheck
+from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalues_in_words
 from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE
-from halfdof_ctrl.reduction.choose import ExactReduction
 
 SHOWN_STATES = 12  #: larger matrices are in the files only
 SHOWN_EIGENVALUES = 40

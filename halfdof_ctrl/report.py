@@ -16,19 +16,20 @@ import control
 import matplotlib.pyplot as plt
 import numpy as np
 
-from halfdof_ctrl.files.containers import PathLike
-from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
-from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
-from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError
-from halfdof_ctrl.files.models import naming_target, replacing, save_system
+from halfdof_ctrl.files.containers import PathLike
+from halfdof_ctrl.files.systems import save_system
+from halfdof_ctrl.files.writing import naming_target, replacing
+from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.page import MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
 from halfdof_ctrl.systems.state_space import mech2ss
 
 DPI = 200  #: of PNG figures

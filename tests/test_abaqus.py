@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fe_files import NAMES, K, abaqus, matrix_market
 
-from halfdof_ctrl.files.formats.abaqus import data_columns, read_abaqus
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.abaqus import data_columns, read_abaqus
 
 
 @pytest.mark.parametrize("side", ["lower", "upper", "both"])

@@ -11,8 +11,8 @@ from hypothesis import given
 from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import hydromount
-from halfdof_ctrl.sweeps.cases import Parameters, in_words, listed_cases, require_accepted
 from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.sweeps.cases import Parameters, in_words, listed_cases, require_accepted
 
 LISTS = st.dictionaries(
     st.sampled_from("abcd"), st.lists(st.integers(-9, 9), min_size=1, max_size=4), min_size=1, max_size=3

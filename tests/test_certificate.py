@@ -12,10 +12,9 @@ from structures import Structure, rank_deficient, structures
 from test_deflation import realization
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
-from halfdof_ctrl.reduction.method.proof import AXIS, Losses, ScaledPencil
-from halfdof_ctrl.reduction.deflation.method import has_spectrum
-from halfdof_ctrl.reduction.deflation.row_system import scaled_rows
+from halfdof_ctrl.reduction.method.proof import AXIS, Losses, ScaledPencil, has_spectrum
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
+from halfdof_ctrl.reduction.method.units import scaled_rows
 
 FloatArray = npt.NDArray[np.float64]
 SEEDS = st.integers(0, 2**32 - 1)

@@ -15,12 +15,13 @@ from fe_models import spring_grid
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
-from halfdof_ctrl.cli import main
-from halfdof_ctrl.systems.crosscheck import CrossCheck
-from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.base.errors import HalfdofError
-from halfdof_ctrl.files.models import load_system, save_model
+from halfdof_ctrl.cli import main
+from halfdof_ctrl.design.lqr import lqr
+from halfdof_ctrl.files.models import save_model
+from halfdof_ctrl.files.systems import load_system
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
+from halfdof_ctrl.systems.crosscheck import CrossCheck
 
 COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -11,9 +11,9 @@ from fe_files import K
 from scipy.sparse import coo_array, csc_array
 
 from halfdof_ctrl import inspect_files, load_model, save_model
-from halfdof_ctrl.files.containers import load_variables, sparse_parts
 from halfdof_ctrl.base.errors import FileFormatError
-from halfdof_ctrl.model.second_order import mechss
+from halfdof_ctrl.files.containers import load_variables, sparse_parts
+from halfdof_ctrl.model.mechss import mechss
 
 PARTS = sparse_parts("K", csc_array(K))
 

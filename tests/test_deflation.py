@@ -13,8 +13,8 @@ from test_relaxation import SEEDS, USUAL, drawn
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
 from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.reduction.deflation.relaxation import relaxed
-from halfdof_ctrl.reduction.deflation.row_system import Units, scaled_rows
 from halfdof_ctrl.reduction.method.signals import StateEquations
+from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 
 ComplexArray = npt.NDArray[np.complex128]
 ROUNDOFF = 1e-12  # small well-conditioned models

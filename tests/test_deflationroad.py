@@ -12,10 +12,12 @@ from numpy.testing import assert_allclose, assert_array_equal
 from test_deflation import POINTS, response
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, hydromount, mechss
-from halfdof_ctrl.reduction.deflation import method as deflationroad
-from halfdof_ctrl.reduction.deflation.method import CAUTIONS, StateSelection, deflated, has_spectrum, loss
 from halfdof_ctrl.base.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.reduction.deflation import method as deflationroad
+from halfdof_ctrl.reduction.deflation.method import CAUTIONS, deflated
 from halfdof_ctrl.reduction.deflation.row_system import Caution
+from halfdof_ctrl.reduction.deflation.states import StateSelection
+from halfdof_ctrl.reduction.method.proof import has_spectrum, loss
 from halfdof_ctrl.reduction.method.signals import StateEquations
 
 FloatArray = npt.NDArray[np.float64]

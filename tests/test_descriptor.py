@@ -10,8 +10,8 @@ from structures import Structure, damped_structures, structures
 from test_paper import paired
 
 from halfdof_ctrl import exact_reduction, hydromount, mechss, pencil_structure, zeros
-from halfdof_ctrl.descriptor.structure import require_regular
 from halfdof_ctrl.base.errors import SingularPencilError
+from halfdof_ctrl.descriptor.regularity import require_regular
 
 ROUNDOFF = 1e-11  # eigenvalues of a few well-conditioned unknowns by QZ
 COMPARED = 1e-7  # random structures have eigenvalues of condition up to 1e8

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from fe_files import EXPORTS, NAMES, C, K, M, dmig
 
-from halfdof_ctrl.files.formats.dmig import has_dmig, has_extrn, read_dmig, read_extrn
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.dmig import has_dmig, has_extrn, read_dmig, read_extrn
 
 SMALL = """\
 DMIG    KAAX           0       6       1       0

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import hydromount, mech2ss, mechss
-from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_in_words, eigenvalue_table, eigenvalues_in_words
+from halfdof_ctrl.base.words import eigenvalue_in_words
+from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table, eigenvalues_in_words
 
 MOUNT = hydromount()
 

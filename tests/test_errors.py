@@ -27,8 +27,8 @@ from halfdof_ctrl.base.errors import (
     UncertainRankError,
     WeightError,
     WorkerError,
-    naming_the_file,
 )
+from halfdof_ctrl.files.naming import naming_the_file
 
 EXAMPLES: list[HalfdofError] = [
     MatrixError("K is empty", matrix="K"),

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from test_relaxation import SEEDS, USUAL, drawn, rational_coefficients, system_of
 
+from halfdof_ctrl.reduction.algebra.integers import as_floats
 from halfdof_ctrl.reduction.deflation import exact_solution as exactsolution
-from halfdof_ctrl.reduction.deflation.realization import realized
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
-from halfdof_ctrl.reduction.algebra.integers import as_floats
+from halfdof_ctrl.reduction.deflation.realization import realized
 from halfdof_ctrl.reduction.deflation.relaxation import relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution
 

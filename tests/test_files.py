@@ -18,12 +18,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, frequency_response, hydromount, mech2ss, mechss
-from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.base.errors import FileFormatError, MatrixError, SignalNameError
-from halfdof_ctrl.files.models import load_model, load_system, replacing, save_gain, save_model, save_response, save_system
-from halfdof_ctrl.model.second_order import LETTERS
-from halfdof_ctrl.model.motion import KINDS, MotionKind
 from halfdof_ctrl.base.names import motion_names
+from halfdof_ctrl.design.lqr import lqr
+from halfdof_ctrl.files.models import load_model, save_model
+from halfdof_ctrl.files.systems import load_system, save_system
+from halfdof_ctrl.files.tables import save_gain, save_response
+from halfdof_ctrl.files.writing import replacing
+from halfdof_ctrl.model.motion import KINDS, MotionKind
+from halfdof_ctrl.model.second_order import LETTERS
 
 ENDINGS = pytest.mark.parametrize("ending", [".npz", ".mat"])
 MOUNT = hydromount()

@@ -8,9 +8,9 @@ from fe_files import K, M, abaqus
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import inspect_files, save_model
-from halfdof_ctrl.files.import_report import mass_per_direction, matrix_report
-from halfdof_ctrl.model.second_order import mechss
 from halfdof_ctrl.files.formats.raw_matrix import storage
+from halfdof_ctrl.files.import_report import mass_per_direction, matrix_report
+from halfdof_ctrl.model.mechss import mechss
 
 
 def report_of(matrix: np.ndarray, largest: int = 1000) -> object:

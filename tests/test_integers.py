@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl.reduction.algebra.integers import as_floats, as_integers, log_determinant, solved_exactly, without_common_factor
+from halfdof_ctrl.reduction.algebra.integers import (
+    as_floats,
+    as_integers,
+    log_determinant,
+    solved_exactly,
+    without_common_factor,
+)
 
 FLOATS = st.lists(st.floats(-1e9, 1e9, allow_subnormal=False), min_size=1, max_size=6)
 

@@ -3,8 +3,8 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from halfdof_ctrl.files.formats.labels import ansys_name, direction_of, dof_names
 from halfdof_ctrl.base.names import checked_dofs
+from halfdof_ctrl.files.formats.labels import ansys_name, direction_of, dof_names
 
 LABELS = st.sets(st.tuples(st.integers(-9, 2**31 - 1), st.integers(0, 20)), min_size=1, max_size=40)
 

@@ -12,7 +12,9 @@ from structures import Structure
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
 from halfdof_ctrl.reduction.algebra.leading_matrix import PLAINLY_REGULAR_IF_SMALL, LeadingMatrix
-from halfdof_ctrl.reduction.dense.partition import DofPartition, orthonormal_bases, select_columns
+from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
+from halfdof_ctrl.reduction.dense.partition import DofPartition
+from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns
 
 ROUNDOFF = 1e-11  # random 6 x 6 matrices

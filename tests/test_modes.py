@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import ArpackNoConvergence
 
-from halfdof_ctrl.reduction.modal import modes
 from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.reduction.modal import modes
 from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, count_below, is_unsymmetric, lowest_modes
 
 DIGITS = 1e-8  # of frequencies of small frames, whose condition is 1e6

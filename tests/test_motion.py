@@ -13,9 +13,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from structures import Structure, damped_structures, structures
 
 from halfdof_ctrl import SecondOrderModel, crosscheck, exact_reduction, hydromount, lqr, mech2ss, mechss
-from halfdof_ctrl.plots.axes import known_units
-from halfdof_ctrl.base.errors import ImproperError, ParameterError, SignalNameError, SingularLeadingMatrixError, WeightError
+from halfdof_ctrl.base.errors import (
+    ImproperError,
+    ParameterError,
+    SignalNameError,
+    SingularLeadingMatrixError,
+    WeightError,
+)
 from halfdof_ctrl.model.motion import KINDS, MotionKind
+from halfdof_ctrl.plots.units import known_units
 
 ROUNDOFF = 1e-12  # direct solves of small matrices with small integer entries
 EXACT = 1e-10  # the same with n <= 8 and conditions up to 1e6

@@ -14,8 +14,7 @@ from test_deflationroad import dense
 from test_relaxation import SEEDS, drawn
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mechss
-from halfdof_ctrl.reduction.method.outputs import output_signal, without_rounding
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 
 FloatArray = npt.NDArray[np.float64]
 ROUNDOFF = 1e-12  # small well-conditioned models

@@ -13,7 +13,10 @@ from structures import Structure, structures
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.base.errors import NearlyMasslessWarning
-from halfdof_ctrl.reduction.dense.partition import RankDecision, mass_ratios, orthonormal_bases, select_columns, without_light_masses
+from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
+from halfdof_ctrl.reduction.dense.selection import select_columns
+from halfdof_ctrl.reduction.method.evidence import RankDecision
+from halfdof_ctrl.reduction.method.masses import mass_ratios, without_light_masses
 
 ORTHOGONAL = 1e-12  # products of orthonormal vectors with small integer matrices, n <= 12
 THERE_AND_BACK = 1e-10  # T of up to 12 mixed columns, scaled by powers of two, has a condition of up to 1e5

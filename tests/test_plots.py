@@ -15,12 +15,12 @@ from matplotlib.lines import Line2D
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss, pencil_structure, zeros
-from halfdof_ctrl.plots.bode import continuous_phase
-from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.base.errors import ImproperError, ParameterError, SignalNameError
-from halfdof_ctrl.systems.step_times import MOST_STEPS, relevant_poles, step_times
+from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+from halfdof_ctrl.systems.step_times import MOST_STEPS, relevant_poles, step_times
 
 ROUNDING = 1e-12  #: curve and markers come by different routes; both are exact to a few digits less than that
 OMEGA = np.geomspace(0.5, 100.0, 60)  #: [rad/s] around the hydromount's modes

@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl.base.errors import FileFormatError
-from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, Triangle, assembled, completed, storage, with_triangle
+from halfdof_ctrl.files.formats.raw_matrix import (
+    Declared,
+    RawMatrix,
+    Triangle,
+    assembled,
+    completed,
+    storage,
+    with_triangle,
+)
 
 K = np.array([[2.0, -1.0, 0.0], [-1.0, 3.0, -2.0], [0.0, -2.0, 4.0]])
 EITHER = np.array([[2.0, -1.0, 0.0], [0.0, 3.0, 0.0], [0.0, -2.0, 4.0]])  #: one entry of each pair, on either side

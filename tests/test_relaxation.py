@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import SecondOrderModel, hydromount
 from halfdof_ctrl.reduction.deflation.offsets import structural_offsets
 from halfdof_ctrl.reduction.deflation.relaxation import RANK_TOLERANCE, UNCLEAR, Relaxed, independent_rows, relaxed
-from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, Units, levelled, scaled_rows, unit_free
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, levelled, unit_free
+from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 
 FloatArray = npt.NDArray[np.float64]
 ROUNDOFF = 1e-12  # a few operations on small well-conditioned matrices

@@ -20,7 +20,7 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
     WeightError,
 )
-from halfdof_ctrl.files.models import load_system
+from halfdof_ctrl.files.systems import load_system
 from halfdof_ctrl.report import default_design, default_effort, write_report
 
 FILES = {

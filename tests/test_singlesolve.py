@@ -14,9 +14,11 @@ from test_deflation import POINTS, response
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mechss
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.dense.partition import DofPartition, orthonormal_bases, select_columns
-from halfdof_ctrl.reduction.method.signals import Rounding, StateEquations
+from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
+from halfdof_ctrl.reduction.dense.partition import DofPartition
+from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
+from halfdof_ctrl.reduction.method.signals import Rounding, StateEquations
 
 FloatArray = npt.NDArray[np.float64]
 ROUNDOFF = 1e-13  # the mount

@@ -13,8 +13,8 @@ from scipy.sparse import csc_array
 from structures import Structure, on_axis, structures
 
 from halfdof_ctrl import mechss
-from halfdof_ctrl.model import sparse_evaluation as sparseevaluation
 from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.model import sparse_evaluation as sparseevaluation
 from halfdof_ctrl.model.evaluation import quadratic_transfer
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
 

@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import block_diag, csc_array, diags_array, eye_array
 from test_leading import arrow
 
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra import sparse_lu as sparselu
 from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
-from halfdof_ctrl.base.sparse_arrays import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, is_nearly_symmetric, sparse_equilibrating_factors
 
 SOLVED = 1e-13  # times the condition number: solutions of up to 30 equations

@@ -10,10 +10,13 @@ from scipy.sparse import block_diag, csc_array
 from structures import Structure, rank_deficient, structures
 
 from halfdof_ctrl import SecondOrderModel, mechss
-from halfdof_ctrl.reduction.sparse import partition as sparsepartition
 from halfdof_ctrl.base.errors import ModelSizeError, NearlyMasslessWarning
-from halfdof_ctrl.reduction.dense.partition import mass_ratios, orthonormal_bases, select_columns
-from halfdof_ctrl.reduction.sparse.partition import _mass_ratios, select_sparse_columns, sparse_bases
+from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
+from halfdof_ctrl.reduction.dense.selection import select_columns
+from halfdof_ctrl.reduction.method.masses import mass_ratios
+from halfdof_ctrl.reduction.sparse import partition as sparsepartition
+from halfdof_ctrl.reduction.sparse.bases import sparse_bases
+from halfdof_ctrl.reduction.sparse.selection import _mass_ratios, select_sparse_columns
 
 SETTLED = 1e-2  # the sparse scaling is iterated to a hundredth of a power of two
 ROUNDOFF = 1e-12  # products of small integer matrices with orthonormal blocks

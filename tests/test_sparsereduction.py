@@ -17,7 +17,6 @@ from scipy.sparse.linalg import splu
 from structures import Structure, on_axis, structures
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss, mechss
-from halfdof_ctrl.reduction.sparse import displacement as sparsedisplacement
 from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
@@ -27,6 +26,7 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
 )
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
+from halfdof_ctrl.reduction.sparse import displacement as sparsedisplacement
 from halfdof_ctrl.reduction.sparse.partition import SparsePartition
 
 EPS = float(np.finfo(float).eps)

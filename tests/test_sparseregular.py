@@ -9,8 +9,8 @@ from scipy.sparse import block_diag, csc_array, diags_array
 from structures import Structure, structures
 
 from halfdof_ctrl import mechss
-from halfdof_ctrl.descriptor.structure import require_regular
 from halfdof_ctrl.base.errors import SingularPencilError
+from halfdof_ctrl.descriptor.regularity import require_regular
 
 
 @given(structure=structures(largest=8))

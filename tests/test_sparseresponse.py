@@ -12,18 +12,18 @@ from scipy.sparse import block_diag, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
 from halfdof_ctrl import SecondOrderModel, bode_plot, descriptor_response, frequency_response, mech2ss, mechss
-from halfdof_ctrl.systems import frequency as response
-from halfdof_ctrl.model import sparse_evaluation as sparseevaluation
-from halfdof_ctrl.descriptor import sparse_response as sparseresponse
 from halfdof_ctrl.base.errors import (
     InterruptedResponseWarning,
     ModelSizeError,
     ParameterError,
     SingularPencilError,
 )
-from halfdof_ctrl.systems.frequency import has_many_states, model_frequencies
-from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
+from halfdof_ctrl.descriptor import sparse_response as sparseresponse
 from halfdof_ctrl.descriptor.sparse_response import coarse_to_fine
+from halfdof_ctrl.model import sparse_evaluation as sparseevaluation
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
+from halfdof_ctrl.systems import frequency as response
+from halfdof_ctrl.systems.frequency import has_many_states, model_frequencies
 
 DIGITS = 1e-8  # of responses of frames and grids against factorizations by scipy as it stands
 OMEGA = np.geomspace(0.5, 500.0, 9)  # [rad/s]

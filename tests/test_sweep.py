@@ -27,8 +27,8 @@ from halfdof_ctrl import (
     sweep,
 )
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError, SweepInterruptedError
-from halfdof_ctrl.sweeps.one_case import by_size
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.sweeps.one_case import by_size
 
 OMEGA = np.geomspace(1.0, 50.0, 7)
 ROUNDING = 1e-14  #: of the eigenvalues of a 2 x 2 matrix

@@ -12,9 +12,16 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.sparse import csc_array, diags_array
 
-from halfdof_ctrl import SecondOrderModel, TruncatedModel, descriptor_response, load_model, mech2ss, mechss, save_model, truncate_modes
-from halfdof_ctrl.reduction.modal import craig_bampton as craigbampton
-from halfdof_ctrl.reduction.modal import truncation
+from halfdof_ctrl import (
+    SecondOrderModel,
+    TruncatedModel,
+    descriptor_response,
+    load_model,
+    mech2ss,
+    mechss,
+    save_model,
+    truncate_modes,
+)
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -23,6 +30,8 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
     TruncationWarning,
 )
+from halfdof_ctrl.reduction.modal import craig_bampton as craigbampton
+from halfdof_ctrl.reduction.modal import truncation
 
 AT_REST = 1e-9  # the small model is exact at s = 0, up to the condition of K
 EVERYTHING = 1e-6  # with all modes kept it is exact everywhere, up to the same

@@ -20,9 +20,10 @@ from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import hydromount, sweep
 from halfdof_ctrl.base.errors import FailedCasesWarning, SweepInterruptedError, WorkerError
-from halfdof_ctrl.sweeps.one_case import CaseError
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.sweeps.workers import ATTEMPTS, CHUNK_SECONDS, _Pool, _Waiting, work_through
+from halfdof_ctrl.sweeps.one_case import CaseError
+from halfdof_ctrl.sweeps.process_pool import _Pool
+from halfdof_ctrl.sweeps.workers import ATTEMPTS, CHUNK_SECONDS, _Waiting, work_through
 
 COUNT = 40
 START = "forkserver" if sys.platform == "linux" else "spawn"  #: the server that the sweep uses is there already

@@ -5,11 +5,7 @@ The attributes repeat the facts for programs.
 """
 
 import sys
-import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-
-MOST_WORDS = 300  #: characters of another library's error that are passed on
+from collections.abc import Callable
 
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
@@ -171,30 +167,6 @@ class MissingExtraError(FileFormatError):
         self.extra = extra
 
 
-@contextmanager
-def naming_the_file(path: object) -> Iterator[None]:
-    """Turn what goes wrong with a file's content into a refusal that names the file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
-            yield
-    except MissingExtraError as refusal:
-        msg = f"{path}: {refusal}"
-        raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal
-    except HalfdofError as refusal:
-        line = getattr(refusal, "line", None)
-        words = " ".join(str(refusal).splitlines())
-        msg = f"{path}{'' if line is None else f', line {line}'}: {words}"
-        raise FileFormatError(msg, path=str(path), line=line) from refusal
-    except OSError:
-        raise
-    except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
-        reason = " ".join(str(cause).split()) or type(cause).__name__
-        reason = reason if len(reason) <= MOST_WORDS else f"{reason[:MOST_WORDS]}..."  # some quote the file at length
-        msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
-        raise FileFormatError(msg, path=str(path)) from cause
-
-
 class WorkerError(HalfdofError):
     """Worker processes cannot start or cannot load what they are to do; `function` is its name."""
 
@@ -212,7 +184,7 @@ class SweepInterruptedError(KeyboardInterrupt):
 
 
 def callers_level() -> int:
-    """Give the `stacklevel` of a warning that is to point at the first line outside this package."""
+    """Return the `stacklevel` of a warning that is to point at the first line outside this package."""
     frame, level = sys._getframe(1), 1  # noqa: SLF001  # the way that the standard library goes too
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
         frame, level = frame.f_back, level + 1

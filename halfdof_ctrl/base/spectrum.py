@@ -10,7 +10,7 @@ ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault
 
 
 def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """Give the eigenvalues and the first-order bound of what rounding in A moves each.
+    """Return the eigenvalues and the first-order bound of what rounding in A moves each.
 
     The bound is 16 eps |A| over the cosine between left and right eigenvector, A balanced by powers of two. It
     holds for multiple eigenvalues as well: where rounding splits a double one by sqrt(eps), the computed
@@ -62,3 +62,10 @@ def balanced_states(A: FloatArray) -> tuple[FloatArray, FloatArray]:
         return A, np.ones(0)
     matrix, _, _, factors, _ = dgebal(A, scale=1, permute=0)
     return np.asarray(matrix), np.asarray(factors)
+
+
+def sorted_eigenvalues(values: ComplexArray) -> ComplexArray:
+    """Sort by size, conjugate pairs with the positive imaginary part first."""
+    with np.errstate(divide="ignore"):
+        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
+    return values[np.lexsort((-values.imag, size))]

@@ -12,7 +12,7 @@ SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibrat
 
 
 def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows and columns that bring their largest entries near one.
+    """Return powers of two for rows and columns that bring their largest entries near one.
 
     Rows and columns are divided by the square roots of their maxima in turns, zero ones left alone.
     """
@@ -20,7 +20,7 @@ def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def balancing_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows and columns that bring their entries near one.
+    """Return powers of two for rows and columns that bring their entries near one.
 
     First in the mean of the logarithms, which has one solution whatever the units were (A. R. Curtis and J. K. Reid,
     1972), then the largest entries.

@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, Matrix
-from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
+from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 IntArray = npt.NDArray[np.int64]
 
@@ -68,7 +68,7 @@ def _bounds(model: SecondOrderModel, index: int) -> IntArray:
 
 
 def _degrees(coefficients: tuple[Matrix, ...]) -> IntArray:
-    """Give the degree of each entry of a matrix polynomial."""
+    """Return the degree of each entry of a matrix polynomial."""
     degrees = np.full(coefficients[0].shape, NO_GROWTH, dtype=np.int64)
     for power, matrix in enumerate(coefficients):
         degrees[matrix != 0.0] = power
@@ -109,7 +109,7 @@ def _finite_count(model: SecondOrderModel, i: int, j: int) -> int:
 
 
 def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[Matrix]:
-    """Give the coefficients of the system pencil (9) of some outputs and inputs."""
+    """Return the coefficients of the system pencil (9) of some outputs and inputs."""
     return [
         np.block([[P, -B[:, inputs]], [F[outputs], D[np.ix_(outputs, inputs)]]])
         for P, B, F, D in (

@@ -125,7 +125,7 @@ class RadauStep:
         return cls(h, A, rows, tuple(factors))
 
     def advance(self, x: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give the states (n, k) one step later, and their slopes there."""
+        """Return the states (n, k) one step later, and their slopes there."""
         right = (self.rows * (self.A @ x + b)).astype(np.complex128)
         change, slope = np.zeros_like(x), np.zeros_like(x)
         for mode, factor in zip(_modes(), self.factors, strict=True):
@@ -157,7 +157,7 @@ def _modes() -> tuple[_Mode, ...]:
 
 
 def radau_points(stages: int = STAGES) -> FloatArray:
-    """Give the Radau points on (0, 1], the last of them 1."""
+    """Return the Radau points on (0, 1], the last of them 1."""
     inner, _ = scipy.special.roots_jacobi(stages - 1, 1.0, 0.0)
     return np.append((inner + 1.0) / 2.0, 1.0)
 

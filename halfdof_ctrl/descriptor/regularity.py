@@ -1,25 +1,26 @@
-"""Whether the pencil of a sparse model is regular, for the oracle: one factorization and a few steps of iteration.
-
-At a generic point s the equilibrated P(s) of a regular pencil has a smallest singular value away from rounding. It is
-found by inverse iteration on P(s)^H P(s), which ends in a null vector where there is one. The reduction does not use
-this module.
-"""
+"""Whether det P(s) vanishes at every s, told by the oracle for itself, dense and sparse."""
 
 from typing import Any, cast
 
 import numpy as np
+import scipy.linalg
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import FloatArray, Matrix
 from halfdof_ctrl.base.errors import SingularPencilError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
-from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
+from halfdof_ctrl.descriptor.first_order import typical_frequency
+from halfdof_ctrl.descriptor.patterns import diagonal_blocks
+from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
+from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
 
-GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where P(s) is looked at, in units of the time scale
 SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
 STEPS = 4  #: of inverse iteration
@@ -74,10 +75,51 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
 
 
 def _time_scale(coefficients: list[SparseMatrix]) -> float:
-    """Give a frequency [rad/s], a power of two, at which the largest entries of K and M (or C) balance."""
+    """Return a frequency [rad/s], a power of two, at which the largest entries of K and M (or C) balance."""
     K, C, M = (float(np.abs(matrix.data).max(initial=0.0)) for matrix in coefficients)
     if K > 0.0 and M > 0.0:
         return float(2.0 ** np.round(np.log2(K / M) / 2.0))
     if K > 0.0 and C > 0.0:
         return float(2.0 ** np.round(np.log2(K / C)))
     return float(2.0 ** np.round(np.log2(C / M))) if C > 0.0 and M > 0.0 else 1.0
+
+
+def require_regular(model: SecondOrderModel) -> None:
+    """Refuse a singular pencil, naming the DOFs that nothing holds and the equations that say too little.
+
+    Raises
+    ------
+    SingularPencilError
+        ``P(s)`` is singular to working precision at three generic points.
+    """
+    if model.is_sparse:
+        require_regular_sparse(model)
+        return
+    gamma = typical_frequency(model)
+    P = model.K
+    for point in GENERIC_POINTS:
+        s = gamma * point
+        P = model.K + s * model.C + s**2 * model.M
+        if not _is_singular(P):
+            return
+    null = null_spaces(P)
+    n = len(model.dofs)
+    raise singular_pencil_error(
+        dofs=[model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))],
+        equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
+        fact=f"its rank is {n - null.dimension} of {n}, smallest singular value {null.smallest:.1e} of the largest",
+        causes=causes(null, (model.K, model.C, model.M), model.dofs),
+    )
+
+
+def _is_singular(P: Matrix) -> bool:
+    """Return whether an irreducible diagonal block of a square matrix is singular to working precision."""
+    for rows, columns in diagonal_blocks(P != 0.0):
+        if rows.size != columns.size:
+            return True
+        block = P[np.ix_(rows, columns)]
+        down, across = equilibrating_powers(np.abs(block))
+        values = scipy.linalg.svdvals(block * down[:, None] * across)
+        if values[-1] <= RANK_TOLERANCE * values.size * values[0]:
+            return True
+    return False

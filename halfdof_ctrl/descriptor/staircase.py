@@ -37,11 +37,11 @@ class Pencil:
         return cls(A, E, (EPS * np.abs(A)) ** 2, (EPS * np.abs(E)) ** 2)
 
     def transposed(self) -> "Pencil":
-        """Give the pencil with rows and columns exchanged."""
+        """Return the pencil with rows and columns exchanged."""
         return Pencil(self.A.T, self.E.T, self.dA.T, self.dE.T)
 
     def reversed(self) -> "Pencil":
-        """Give ``E - s A``, which has the inverse eigenvalues."""
+        """Return ``E - s A``, which has the inverse eigenvalues."""
         return Pencil(self.E, self.A, self.dE, self.dA)
 
     def part(self, rows: Places, columns: Places) -> "Pencil":
@@ -70,7 +70,7 @@ class Pencil:
         return [self.part(*places) for places in diagonal_blocks((self.A != 0.0) | (self.E != 0.0))]
 
     def eigenvalues(self) -> ComplexArray:
-        """Give the eigenvalues by QZ; E must be nonsingular."""
+        """Return the eigenvalues by QZ; E must be nonsingular."""
         if self.E.shape[0] == 0:
             return np.zeros(0, dtype=np.complex128)
         return np.asarray(scipy.linalg.eigvals(self.A, self.E), dtype=np.complex128)
@@ -84,7 +84,7 @@ class Evidence:
     margin: float = float("inf")  #: smallest ratio of a pivot that counts to the level from which it would not
 
     def and_also(self, other: "Evidence") -> "Evidence":
-        """Give the weaker of both."""
+        """Return the weaker of both."""
         return Evidence(min(self.gap, other.gap), min(self.margin, other.margin))
 
 
@@ -135,7 +135,7 @@ def deflated_once(pencil: Pencil) -> Step:
 
 
 def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, Evidence]:
-    """Give an orthogonal matrix whose first columns span the range, the rank, and how clear it is."""
+    """Return an orthogonal matrix whose first columns span the range, the rank, and how clear it is."""
     if not matrix.any():
         return np.eye(matrix.shape[0]), 0, Evidence()
     left, triangle, _ = scipy.linalg.qr(matrix, pivoting=True)

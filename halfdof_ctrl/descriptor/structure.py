@@ -7,26 +7,16 @@ to its finite part (`pencils`). Zeros are the finite eigenvalues of the system p
     [ F(s)   D(s) ]                                                                        (9)
 """
 
-import warnings
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
-import scipy.linalg
-
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.spectrum import sorted_eigenvalues
+from halfdof_ctrl.descriptor.finite_part import CLEAR_MARGIN, finite_part, infinite_part
+from halfdof_ctrl.descriptor.first_order import first_order_pencil
+from halfdof_ctrl.descriptor.growth import improper_pairs
 from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
-from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.model.singular import causes, null_spaces
-from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.finite_part import CLEAR_MARGIN, GENERIC_POINTS, finite_part, infinite_part
-from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
-from halfdof_ctrl.model.refusals import singular_pencil_error
-from halfdof_ctrl.descriptor.regularity import require_regular_sparse
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -103,7 +93,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
     pencil = first_order_pencil((model.K, model.C, model.M))
     finite, infinite = finite_part(pencil.A, pencil.E), infinite_part(pencil.A, pencil.E)
-    eigenvalues = _sorted(finite.eigenvalues * pencil.scale)
+    eigenvalues = sorted_eigenvalues(finite.eigenvalues * pencil.scale)
     adds_up = eigenvalues.size + sum(infinite.blocks) == len(pencil.E)
     is_clear = infinite.evidence.margin > CLEAR_MARGIN
     return PencilStructure(
@@ -115,135 +105,3 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
         is_certain=finite.is_certain and (not finite.is_regular or (adds_up and is_clear)),
         model=model,
     )
-
-
-def zeros(model: SecondOrderModel) -> ComplexArray:
-    """Find the invariant zeros from the second-order system pencil.
-
-    The pencil keeps the mechanical form, so that no zeros are lost or invented where a state space
-    would have long chains at infinity.
-
-    Parameters
-    ----------
-    model : SecondOrderModel
-        Of any index, with any number of inputs and outputs, dependent or not.
-
-    Returns
-    -------
-    (k,) complex ndarray
-        Where the system pencil has a lower rank than almost everywhere [rad/s], as often as the greatest common
-        divisor of its largest minors has that root, sorted by size; zeros at the origin are exactly zero. Among them
-        are poles of motions that the inputs do not reach or the outputs do not show; the others are the transmission
-        zeros.
-
-    Warns
-    -----
-    CloseDecisionWarning
-        Inputs or outputs are so nearly dependent that the number of zeros may be wrong.
-
-    Raises
-    ------
-    SingularPencilError
-        ``det P(s)`` vanishes identically.
-
-    Notes
-    -----
-    Deflation removes what the pencil has at infinity and what it has too much of rows and of columns (P. Van Dooren,
-    1979). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
-    zeros of the rank that is left.
-
-    Examples
-    --------
-    A mass on a damper and a spring, velocity as output: one zero, at the origin.
-
-    >>> zeros(mechss([[1]], [[2]], [[3]], [[1]], G=[[1]]))
-    array([0.+0.j])
-
-    Two oscillators; the force on the first cannot be seen in the first where the second stands still as an absorber,
-    at 2 rad/s:
-
-    >>> zeros(mechss(np.eye(2), None, [[5, -4], [-4, 4]], [1, 0], [1, 0])).imag.round(9).tolist()
-    [2.0, -2.0]
-    """
-    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
-    require_regular(model)
-    every = _independent(model)
-    pencil = first_order_pencil(system_pencil(model, *every))
-    part = finite_part(pencil.A, pencil.E)
-    if not part.is_certain:
-        msg = (
-            f"The number of zeros, {part.eigenvalues.size}, is in doubt: a rank on which it rests is hardly to be told "
-            "from rounding. Inputs or outputs depend on each other but for rounding; leave one out by select() and "
-            "compare."
-        )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    return _sorted(part.eigenvalues * pencil.scale)
-
-
-def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
-    """Pick outputs and inputs of which no one is a constant combination of others, as those change no zero."""
-    inputs = np.vstack([model.B, model.Bv, model.Ba, model.D, model.Dv, model.Da])
-    outputs = np.hstack([model.F, model.G, model.H, model.D, model.Dv, model.Da])
-    return _independent_columns(outputs.T), _independent_columns(inputs)
-
-
-def _independent_columns(matrix: Matrix) -> list[int]:
-    """Pick columns that span the range."""
-    rows, columns = equilibrating_powers(np.abs(matrix))
-    _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
-    pivots = np.abs(np.diagonal(triangle))
-    rank = int(np.count_nonzero(pivots > RANK_TOLERANCE * max(matrix.shape) * pivots[0]))
-    return sorted(order[:rank].tolist())
-
-
-def require_regular(model: SecondOrderModel) -> None:
-    """Refuse a singular pencil, naming the DOFs that nothing holds and the equations that say too little.
-
-    Raises
-    ------
-    SingularPencilError
-        ``P(s)`` is singular to working precision at three generic points.
-    """
-    if model.is_sparse:
-        require_regular_sparse(model)
-        return
-    gamma = typical_frequency(model)
-    P = model.K
-    for point in GENERIC_POINTS:
-        s = gamma * point
-        P = model.K + s * model.C + s**2 * model.M
-        if not _is_singular(P):
-            return
-    null = null_spaces(P)
-    n = len(model.dofs)
-    raise singular_pencil_error(
-        dofs=[model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))],
-        equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
-        fact=f"its rank is {n - null.dimension} of {n}, smallest singular value {null.smallest:.1e} of the largest",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
-    )
-
-
-def typical_frequency(model: SecondOrderModel) -> float:
-    """Give a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
-    return time_scale((model.K, model.C, model.M))
-
-
-def _sorted(values: ComplexArray) -> ComplexArray:
-    """Sort by size, conjugate pairs with the positive imaginary part first."""
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return values[np.lexsort((-values.imag, size))]
-
-
-def _is_singular(P: Matrix) -> bool:
-    """Tell whether an irreducible diagonal block of a square matrix is singular to working precision."""
-    for rows, columns in diagonal_blocks(P != 0.0):
-        if rows.size != columns.size:
-            return True
-        block = P[np.ix_(rows, columns)]
-        down, across = equilibrating_powers(np.abs(block))
-        values = scipy.linalg.svdvals(block * down[:, None] * across)
-        if values[-1] <= RANK_TOLERANCE * values.size * values[0]:
-            return True
-    return False

@@ -12,7 +12,7 @@ from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 from halfdof_ctrl.reduction.dense.partition import DofPartition
-from halfdof_ctrl.reduction.choose import ExactReduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
 
 Weights: TypeAlias = Mapping[str, float] | None
@@ -93,7 +93,7 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 
 
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Give the rows and weights of the kinetic and the elastic energy."""
+    """Return the rows and weights of the kinetic and the elastic energy."""
     model, part = reduction.model, reduction.partition
     if model.prescribed:
         msg = (
@@ -157,7 +157,7 @@ def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:
 
 
 def _smallest_eigenvalue(matrix: FloatArray) -> float:
-    """Give the smallest eigenvalue after scaling the diagonal to one."""
+    """Return the smallest eigenvalue after scaling the diagonal to one."""
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
     scale = np.where(scale > 0.0, scale, max(scale.max(initial=0.0), 1.0))
     return float(np.linalg.eigvalsh(matrix / scale / scale[:, None])[0])

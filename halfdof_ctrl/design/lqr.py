@@ -23,14 +23,15 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.errors import StabilizationError, WeightError
+from halfdof_ctrl.base.names import force_names, listed, motion_names
+from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
 from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.base.errors import StabilizationError, WeightError
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import force_names, listed, motion_names
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.sparse.partition import SparsePartition
-from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 
 UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
@@ -61,7 +62,7 @@ class StateFeedback:
         return self.reduction.states
 
     def as_mechss(self) -> SecondOrderModel:
-        """Give the closed loop as a second-order model, equation (13).
+        """Return the closed loop as a second-order model, equation (13).
 
         Its finite eigenvalues are the closed-loop poles, which checks the design without the reduction.
 
@@ -280,7 +281,7 @@ def _unsolved_error(poles: ComplexArray) -> StabilizationError:
 
 
 def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
-    """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
+    """Return a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
     matrix, scale = balanced_states(A)
     shown = C * scale
     size = np.abs(shown).max(axis=1, keepdims=True)

@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array
 
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
-from halfdof_ctrl.files.sources import SIGNALS, Source, Sources, find_sources
+from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, storage, with_triangle
 from halfdof_ctrl.files.import_report import (
     PENALTY,
     ImportReport,
@@ -24,8 +25,8 @@ from halfdof_ctrl.files.import_report import (
     mass_per_direction,
     matrix_report,
 )
-from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, storage, with_triangle
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.files.sources import SIGNALS, Source, Sources, find_sources
 
 REQUIRED = ("M", "C", "K")
 ORDER = ("K", "M", "C", "S")  #: whose DOFs come first
@@ -164,7 +165,7 @@ def _aligned(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[Matrices, t
 
 
 def _names_of(found: Sources, letter: str, raw: RawMatrix) -> tuple[str, ...] | None:
-    """Give the names of a matrix's rows: its own, those of the label file beside it, or of the only one that fits."""
+    """Return the names of a matrix's rows: its own, those of the label file beside it, or of the only one that fits."""
     if raw.dofs is not None:
         return raw.dofs
     path, n = found.matrices[letter].path, raw.matrix.shape[0]
@@ -190,7 +191,7 @@ def _sizes_differ(found: Sources, raws: Mapping[str, RawMatrix]) -> FileFormatEr
 
 
 def _differences(names: Mapping[str, tuple[str, ...] | None], labelled: Sequence[str]) -> list[str]:
-    """Tell which DOFs only some of the matrices have."""
+    """Return which DOFs only some of the matrices have."""
     notes = []
     for letter in labelled[1:]:
         extra = [name for name in names[letter] or () if name not in set(names[labelled[0]] or ())]

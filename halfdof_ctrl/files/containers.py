@@ -14,11 +14,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.formats.mat5 import MOST_BYTES, read_mat
 from halfdof_ctrl.files.formats.mat73 import is_mat73, read_mat73
-from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
+from halfdof_ctrl.files.naming import naming_the_file
 
 PathLike: TypeAlias = str | os.PathLike[str]
 Content: TypeAlias = Mapping[str, Any]
@@ -29,7 +30,7 @@ SPARSE_PARTS = ("data", "indices", "indptr", "shape")
 
 
 def ending(path: PathLike, known: Sequence[str]) -> str:
-    """Give the ending of a path in small letters, and refuse one that is not known."""
+    """Return the ending of a path in small letters, and refuse one that is not known."""
     suffix = Path(path).suffix.lower()
     if suffix not in known:
         msg = f"{path}: the ending {suffix or '(none)'} names no format for this. Use {', '.join(known)}."
@@ -51,7 +52,7 @@ def load_variables(path: PathLike, wanted: Sequence[str]) -> Content:
 
 
 def texts(content: Content, key: str) -> list[str] | None:
-    """Give names, which are a text array in .npz and a list of texts from .mat."""
+    """Return names, which are a text array in .npz and a list of texts from .mat."""
     value = content.get(key)
     if value is None or isinstance(value, list):
         return value
@@ -64,7 +65,7 @@ def texts(content: Content, key: str) -> list[str] | None:
 
 
 def single_text(content: Content) -> str | None:
-    """Give the variable ``name``, None if it is empty or not there."""
+    """Return the variable ``name``, None if it is empty or not there."""
     found = texts(content, "name") or [""]
     if len(found) > 1:
         msg = f"name must be one text, but it has {len(found)}."
@@ -73,7 +74,7 @@ def single_text(content: Content) -> str | None:
 
 
 def sparse_parts(key: str, matrix: Any) -> dict[str, Any]:  # noqa: ANN401  # any sparse format
-    """Give the arrays by which an archive stores a sparse matrix."""
+    """Return the arrays by which an archive stores a sparse matrix."""
     columns = csc_array(matrix)
     return {f"{key}.{part}": np.asarray(getattr(columns, part)) for part in SPARSE_PARTS}
 

@@ -104,7 +104,7 @@ def _at_unit_diagonal(symmetric: csc_array) -> csc_array:
 def _small_spectra(
     entries: coo_array, label: npt.NDArray[Any], first: npt.NDArray[Any], sizes: npt.NDArray[Any]
 ) -> Iterator[FloatArray]:
-    """Give the eigenvalues of the small components, as many of one size as fit into memory at once."""
+    """Return the eigenvalues of the small components, as many of one size as fit into memory at once."""
     owner = label[entries.row]
     by_owner = np.argsort(owner, kind="stable")
     row, column, value = (part[by_owner] for part in (entries.row, entries.col, entries.data))

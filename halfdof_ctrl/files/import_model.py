@@ -13,14 +13,16 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.arrays import checked_matrix
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, MatrixError, callers_level
+from halfdof_ctrl.base.names import checked_dofs
+from halfdof_ctrl.files.assembly import ImportedModel, read_matrices, report_on
 from halfdof_ctrl.files.containers import load_variables, texts
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, MatrixError, callers_level, naming_the_file
-from halfdof_ctrl.files.assembly import ImportedModel, read_matrices, report_on
-from halfdof_ctrl.files.import_report import ImportReport
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
-from halfdof_ctrl.base.names import checked_dofs
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, storage, with_triangle
+from halfdof_ctrl.files.import_report import ImportReport
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 FACTORIZE_NONE = 0  #: loading a model does not wait for ranks
 

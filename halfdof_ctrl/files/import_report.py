@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.definiteness import Inertia, inertia
 from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
-from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.formats.raw_matrix import Storage
 
 SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
@@ -112,7 +112,7 @@ class ImportReport:
         return tuple(found)
 
     def __repr__(self) -> str:
-        """Give the table."""
+        """Return the table."""
         names = "named by node and component" if self.labelled else "without names in the files"
         lines = [f"{type(self).__name__}: {self.n_dofs} DOFs, {names}", *_table(self.matrices)]
         lines += [f"  {letter}  no {WHAT[letter]} in the files: taken as zero" for letter in self.missing]
@@ -174,7 +174,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
 
 
 def has_entries(matrix: csc_array) -> npt.NDArray[np.bool_]:
-    """Tell which columns are not null."""
+    """Return which columns are not null."""
     return np.diff(matrix.indptr) > 0
 
 

@@ -12,51 +12,28 @@ Files are read with ``allow_pickle=False`` and nothing in them is executed. They
 name beside the target, which takes the target's place when it is complete.
 """
 
-import csv
-import io
 import os
-import secrets
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, BinaryIO, TypeAlias
+from typing import Any, TypeAlias
 
-import control
-import numpy as np
-import scipy.io
-from scipy.sparse import issparse
-
-from halfdof_ctrl.base.arrays import checked_matrix, is_zero
-from halfdof_ctrl.files.containers import (
-    MATRIX_ENDINGS,
-    Content,
-    PathLike,
-    ending,
-    load_variables,
-    single_text,
-    sparse_parts,
-    texts,
-)
-from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.design.lqr import StateFeedback
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
-from halfdof_ctrl.files.import_report import ImportReport
-from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel, mechss
-from halfdof_ctrl.files.import_model import container_report, filled, import_model, import_report
+from halfdof_ctrl.base.arrays import is_zero
+from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import checked_names, listed
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS, PathLike, load_variables, single_text, texts
+from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
-from halfdof_ctrl.files.tables import frequency_table, time_table
+from halfdof_ctrl.files.import_model import container_report, filled, import_model, import_report
+from halfdof_ctrl.files.import_report import ImportReport
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 
 Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
-
-TABLE_ENDINGS = (".csv",)
-GAIN_ENDINGS = (*MATRIX_ENDINGS, *TABLE_ENDINGS)
 OPTIONAL_LETTERS = ("Bv", "Ba", "Dv", "Da")  #: written only where they are not zero
 MODEL_NAMES = ("dofs", "inputs", "outputs")
-SYSTEM_LETTERS = ("A", "B", "C", "D")
-SYSTEM_NAMES = ("states", "inputs", "outputs")
-UNKNOWN_PERIOD = -1.0  #: MATLAB's Ts of a sampled system without a period, True in python-control
 
 
 def save_model(model: SecondOrderModel, path: PathLike) -> None:
@@ -87,7 +64,7 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
     names = {key: getattr(model, key) for key in MODEL_NAMES}
-    _save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
+    save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
 
 
 def load_model(
@@ -211,92 +188,8 @@ def inspect_files(
     )
 
 
-def save_system(sys: control.StateSpace, path: PathLike) -> None:
-    """Write A, B, C, D and the labels of a state space, which Python cannot pickle.
-
-    Parameters
-    ----------
-    sys : control.StateSpace
-    path : path-like
-        Ends in ``.npz`` or ``.mat``; in MATLAB: ``load mount.mat; sys = ss(A, B, C, D)``.
-
-    Raises
-    ------
-    FileFormatError
-        Another ending.
-    OSError
-        The file cannot be written.
-    """
-    content = {letter: np.asarray(getattr(sys, letter), dtype=float) for letter in SYSTEM_LETTERS}
-    if sys.dt is not None:
-        content["dt"] = np.array(UNKNOWN_PERIOD if sys.dt is True else float(sys.dt))
-    names = {"states": sys.state_labels, "inputs": sys.input_labels, "outputs": sys.output_labels}
-    _save_matrices(path, content, names, sys.name)
-
-
-def load_system(path: PathLike) -> control.StateSpace:
-    """Read a state space that `save_system` wrote, or any with A, B, C, D.
-
-    Raises
-    ------
-    FileFormatError
-        As `load_model`.
-    OSError
-        The file is not there or cannot be read.
-    """
-    content = load_variables(path, (*SYSTEM_LETTERS, *SYSTEM_NAMES, "name", "dt"))
-    missing = [letter for letter in SYSTEM_LETTERS if letter not in content]
-    if missing:
-        msg = f"{path}: {listed(missing)} not in the file. A state space file holds A, B, C and D."
-        raise FileFormatError(msg, path=str(path))
-    with naming_the_file(path):
-        return _system(content)
-
-
-def save_gain(feedback: StateFeedback, path: PathLike) -> None:
-    """Write the gain K of ``u = -K x`` with the names of its inputs (rows) and states (columns).
-
-    Raises
-    ------
-    FileFormatError
-        The ending is not ``.npz``, ``.mat`` or ``.csv``.
-    OSError
-        The file cannot be written.
-    """
-    if ending(path, GAIN_ENDINGS) not in TABLE_ENDINGS:
-        names = {"inputs": feedback.inputs, "states": feedback.states}
-        _save_matrices(path, {"K": np.asarray(feedback.K)}, names, None)
-        return
-    rows = ([name, *map(repr, row)] for name, row in zip(feedback.inputs, feedback.K.tolist(), strict=True))
-    _save_table(path, ["input", *feedback.states], rows)
-
-
-def save_response(data: control.FrequencyResponseData | control.TimeResponseData, path: PathLike) -> None:
-    """Write the numbers of a response as a table with full precision.
-
-    Parameters
-    ----------
-    data : control.FrequencyResponseData or control.TimeResponseData
-        A frequency response gives ``omega [rad/s]``, ``f [Hz]`` and for each channel ``y/F_y`` its real and
-        imaginary part, magnitude, and phase [deg] without jumps. A time response gives ``t [s]`` and its outputs,
-        ``y``, or ``y/F_y`` where there is a trace for each input.
-    path : path-like
-        Ends in ``.csv``. Names are those of the model (``101.1``), not python-control's labels.
-
-    Raises
-    ------
-    FileFormatError
-        Another ending.
-    OSError
-        The file cannot be written.
-    """
-    ending(path, TABLE_ENDINGS)
-    header, columns = time_table(data) if isinstance(data, control.TimeResponseData) else frequency_table(data)
-    _save_table(path, header, (map(repr, row) for row in np.column_stack(columns).tolist()))
-
-
 def _is_container(path: Paths) -> bool:
-    """Tell whether it is one file that names its matrices."""
+    """Return whether it is one file that names its matrices."""
     one = path if isinstance(path, str | os.PathLike) else next(iter(path)) if len(path) == 1 else None
     return isinstance(one, str | os.PathLike) and Path(one).suffix.lower() in MATRIX_ENDINGS
 
@@ -314,77 +207,3 @@ def _as_paths(path: Paths) -> list[Path] | dict[str, Path]:
         msg = "No file is given. Give at least the stiffness."
         raise FileFormatError(msg, path="")
     return [Path(one) for one in path]
-
-
-@contextmanager
-def replacing(path: PathLike) -> Iterator[BinaryIO]:
-    """Open a temporary file beside the target; it takes the target's place at the end, or goes on an error."""
-    target = Path(path).resolve()
-    if target.exists() and not target.is_file():
-        msg = f"{path}: there is something of that name that is no file. Choose another name."
-        raise FileFormatError(msg, path=str(path))
-    temporary = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
-    try:
-        with naming_target(path):
-            stream = temporary.open("xb")
-        with stream:
-            yield stream
-        with naming_target(path):
-            temporary.replace(target)
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
-
-
-@contextmanager
-def naming_target(path: PathLike) -> Iterator[None]:
-    """Let an OSError tell of the target instead of a temporary name."""
-    try:
-        yield
-    except OSError as cause:
-        raise OSError(cause.errno, cause.strerror, str(path)) from cause
-
-
-def _save_matrices(path: PathLike, content: Content, names: Mapping[str, Sequence[str]], name: str | None) -> None:
-    suffix = ending(path, MATRIX_ENDINGS)
-    for text in (*(text for group in names.values() for text in group), name or ""):
-        if any(ord(letter) < ord(" ") or "\ud800" <= letter <= "\udfff" for letter in text):
-            msg = f"{path}: the name {text!r} holds a control character, which files do not keep. Rename the signal."
-            raise FileFormatError(msg, path=str(path))
-    with replacing(path) as stream:
-        if suffix == ".npz":
-            parts = [sparse_parts(key, value) if issparse(value) else {key: value} for key, value in content.items()]
-            arrays: dict[str, Any] = {key: value for part in parts for key, value in part.items()}
-            arrays |= {key: np.array(value, dtype=np.str_) for key, value in names.items()}
-            np.savez(stream, allow_pickle=False, **arrays, **({} if name is None else {"name": np.array(name)}))
-        else:
-            cells = {key: np.array(value, dtype=object).reshape(1, -1) for key, value in names.items()}
-            title = {} if name is None else {"name": name}
-            scipy.io.savemat(stream, {**title, **cells, **content})  # type: ignore[arg-type]  # stubs know paths only
-
-
-def _save_table(path: PathLike, header: Sequence[str], rows: Iterable[Iterable[str]]) -> None:
-    with replacing(path) as stream:
-        text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(header)
-        writer.writerows(rows)
-        text.detach()
-
-
-def _system(content: Content) -> control.StateSpace:
-    shapes = [np.shape(content[letter]) for letter in SYSTEM_LETTERS]
-    n, m, p = ([*shape, 0, 0][axis] for shape, axis in ((shapes[0], 0), (shapes[3], 1), (shapes[3], 0)))
-    expected = ((n, n), (n, m), (p, n), (p, m))
-    matrices = [checked_matrix(content[key], key, size) for key, size in zip(SYSTEM_LETTERS, expected, strict=True)]
-    labels: dict[str, Any] = {}
-    for key, count in zip(SYSTEM_NAMES, (n, m, p), strict=True):
-        found = texts(content, key)
-        if found is not None:
-            labels[key] = list(checked_names(found, count, key))
-    if "dt" in content:
-        period = float(np.asarray(content["dt"]).item())
-        labels["dt"] = True if period == UNKNOWN_PERIOD else period
-    name = single_text(content)
-    return control.StateSpace(*matrices, **labels, **({} if name is None else {"name": name}))

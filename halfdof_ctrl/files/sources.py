@@ -8,16 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from halfdof_ctrl.files.formats import abaqus
-from halfdof_ctrl.files.formats import dmig
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.files.formats import abaqus, dmig, output4
 from halfdof_ctrl.files.formats import harwell_boeing as harwellboeing
 from halfdof_ctrl.files.formats import matrix_market as matrixmarket
-from halfdof_ctrl.files.formats import output4
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
-from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_labels
-from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_labels
 
 ENDINGS = (".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping")  #: in a folder
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
@@ -166,7 +165,7 @@ def _chosen(sources: Sequence[Source], told: Mapping[str, Path], titles: Mapping
 def _candidates(
     letter: str, sources: Sequence[Source], told: Mapping[str, Path], titles: Mapping[str, str]
 ) -> list[Source]:
-    """Give the matrices that a letter may stand for, by the user's word or by their own."""
+    """Return the matrices that a letter may stand for, by the user's word or by their own."""
     own = [source for source in sources if letter not in told or source.path == told[letter]]
     if letter in titles:
         found = [source for source in own if source.raw.title.lower() == titles[letter].lower()]
@@ -193,5 +192,5 @@ def _candidates(
 
 
 def _is_placeholder(source: Source) -> bool:
-    """Tell whether it is the 1 x 1 matrix of zero that Nastran writes for a matrix that there is not."""
+    """Return whether it is the 1 x 1 matrix of zero that Nastran writes for a matrix that there is not."""
     return source.raw.format.startswith("Nastran") and source.raw.matrix.shape == (1, 1) and not source.raw.matrix.nnz

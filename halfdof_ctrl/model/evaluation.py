@@ -94,7 +94,7 @@ def quadratic_rounding(
 
 
 def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
-    """Give the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
+    """Return the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
     columns = _equilibrating_powers(P)[1]
     size = np.abs(_solved(P, B)) / np.swapaxes(columns, 1, 2)
     return np.asarray((size + np.finfo(float).eps * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
@@ -154,7 +154,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
 
 
 def _equilibrating_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
+    """Return powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
     rows = powers_of_two(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
     return rows, powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
 

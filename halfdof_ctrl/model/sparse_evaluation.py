@@ -19,13 +19,8 @@ from scipy.sparse.linalg import SuperLU, splu
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.base.sparse_arrays import (
-    SparseMatrix,
-    as_sparse,
-    column_of_entries,
-    largest_by_row_and_column,
-    times,
-)
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
@@ -120,7 +115,7 @@ class SparseTransfer:
         return np.asarray(value.T if self.turned else value)
 
     def _times_solution(self, F: SparseMatrix, B: SparseMatrix, s: complex, way: int) -> tuple[ComplexArray, float]:
-        """Give ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
+        """Return ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
         factors = self._factorized(s, way)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
@@ -237,7 +232,7 @@ class PointFactors:
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
 
     def solve(self, right: Matrix) -> tuple[ComplexArray, float]:
-        """Give ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
+        """Return ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
         rows, columns = self.pencil.rows, self.pencil.columns
         scaled: ComplexArray = np.asarray((right if rows is None else right[rows]) * self.down, dtype=np.complex128)
         solution: Any = self.lu.solve(scaled)
@@ -253,7 +248,7 @@ class PointFactors:
         return back, backward_error
 
     def growth(self) -> float:
-        """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
+        """Return the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
         right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
         size = float(np.abs(self.lu.solve(right)).max())
         return size if np.isfinite(size) else np.inf
@@ -266,7 +261,7 @@ class PointFactors:
 
 
 def _polynomial(coefficients: Sequence[SparseMatrix], s: complex) -> SparseMatrix:
-    """Give the value of a matrix polynomial, skipping zero coefficients."""
+    """Return the value of a matrix polynomial, skipping zero coefficients."""
     value = csc_array(coefficients[0])
     for power, part in enumerate(coefficients[1:], start=1):
         if part.nnz:

@@ -27,7 +27,8 @@ import numpy as np
 
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import Axes, Size, axis_name, checked, part_axes, sized
 
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 AXES = ("x", "y", "z", "rx", "ry", "rz")  #: three displacements and the small rotations about them
 

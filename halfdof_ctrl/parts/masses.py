@@ -18,7 +18,8 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import FORCE_PREFIX
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import AXES, Axes, axis_name, checked, part_axes
 
 TRANSLATIONS = 3

@@ -5,7 +5,8 @@ import math
 import numpy as np
 
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import Link, linked
 
 

@@ -15,7 +15,8 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.fluid_column import FluidColumn, fluid_column
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve, Weight, measured_curve, scatter
 from halfdof_ctrl.parts.prony_search import MOST_BRANCHES, best_series, chosen_order, criterion, lag_one, rms

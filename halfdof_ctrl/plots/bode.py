@@ -11,24 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
-from halfdof_ctrl.plots.axes import (
-    CIRCLE,
-    AxesArray,
-    AxesLike,
-    Units,
-    draw_grid,
-    finished_plot,
-    known_units,
-    label_y,
-    legend_prefix,
-    no_lines,
-    plain,
-    prepared_axes,
-    ratio_label,
-    require_system,
-    signal_names,
-)
-from halfdof_ctrl.descriptor.structure import require_regular
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     HalfdofError,
@@ -37,14 +19,28 @@ from halfdof_ctrl.base.errors import (
     SingularLeadingMatrixError,
     UncertainRankError,
 )
+from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.plots.axes import (
+    CIRCLE,
+    AxesArray,
+    AxesLike,
+    draw_grid,
+    finished_plot,
+    label_y,
+    legend_prefix,
+    no_lines,
+    prepared_axes,
+    require_system,
+)
+from halfdof_ctrl.plots.phase import continuous_phase, on_branch
+from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response, has_many_states
 from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
 PEAK_MARKS = 6  #: markers on the highest peaks besides
 CLOSE = 0.05  #: relative distance between frequencies below which one marker does for two peaks
-HALF_TURN = 1e-6  #: [rad] a jump of the phase this close to pi comes from an undamped pole or zero
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
 USUAL = 95.0  #: [%] of the points of a curve lie in the range that is shown in any case
@@ -68,16 +64,16 @@ class Scales:
     deg: bool
 
     def frequency(self, omega: FloatArray) -> FloatArray:
-        """Give frequencies as they are drawn."""
+        """Return frequencies as they are drawn."""
         return omega / (2.0 * np.pi) if self.Hz else omega
 
     def magnitude(self, values: ComplexArray) -> FloatArray:
-        """Give magnitudes as they are drawn."""
+        """Return magnitudes as they are drawn."""
         with np.errstate(divide="ignore"):
             return np.asarray(20.0 * np.log10(np.abs(values)) if self.dB else np.abs(values))
 
     def phase(self, angle: FloatArray) -> FloatArray:
-        """Give an angle [rad] as it is drawn."""
+        """Return an angle [rad] as it is drawn."""
         return np.degrees(angle) if self.deg else angle
 
 
@@ -175,53 +171,16 @@ def bode_plot(
         if exact is not None:
             style = {"label": prefix + "descriptor form", "markersize": 5.0, **CIRCLE}
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
-            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(_on_branch(exact[i, j], phase[marks])), **style)
+            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase[marks])), **style)
     named = sysdata if reference is None else reference
     dress_bode(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 
-def continuous_phase(values: ComplexArray) -> FloatArray:
-    """Give the phase [rad] of a frequency response without jumps, NaN where there is none.
-
-    Parameters
-    ----------
-    values : (k,) complex ndarray
-        At rising frequencies.
-
-    Returns
-    -------
-    (k,) ndarray
-        ``numpy.angle`` plus whole turns. The first value lies in [-pi, pi], a negative real one at pi
-        where the magnitude rises (a zero at the origin), else at -pi; a half turn is taken downwards
-        where the magnitude rises into it (an undamped pole), else upwards (a zero).
-
-    Examples
-    --------
-    >>> continuous_phase(np.array([1.0, 2.0, -2.0, -1.0, 1.0])).round(3).tolist()
-    [0.0, 0.0, -3.142, -3.142, 0.0]
-    """
-    angle = np.where((values == 0.0) | ~np.isfinite(values), np.nan, np.angle(values))
-    there = np.flatnonzero(~np.isnan(angle))
-    if there.size == 0:
-        return angle
-    known, size = angle[there], np.abs(values[there])
-    if np.pi - np.abs(known[0]) < HALF_TURN and (known[0] > 0.0) != (size[1:2] > size[0]).any():
-        known[0] = -known[0]
-    jumps = np.mod(np.diff(known) + np.pi, 2.0 * np.pi) - np.pi
-    half = np.pi - np.abs(jumps) < HALF_TURN
-    rising = np.diff(size[:-1], prepend=0.0) >= 0.0
-    jumps += 2.0 * np.pi * ((half & ~rising & (jumps < 0.0)) * 1.0 - (half & rising & (jumps > 0.0)) * 1.0)
-    unwrapped = known[0] + np.concatenate([[0.0], np.cumsum(jumps)])
-    phase = angle.copy()
-    phase[there] += 2.0 * np.pi * np.round((unwrapped - angle[there]) / (2.0 * np.pi))
-    return phase
-
-
 def _curve(
     sysdata: control.StateSpace | SecondOrderModel, omega: npt.ArrayLike | None, reference: SecondOrderModel | None
 ) -> tuple[control.FrequencyResponseData, str, SecondOrderModel | None]:
-    """Give the curve, what it is, and the model that the markers come from."""
+    """Return the curve, what it is, and the model that the markers come from."""
     require_system(sysdata)
     if isinstance(sysdata, SecondOrderModel):
         if has_many_states(sysdata):
@@ -266,13 +225,6 @@ def _marked(curve: control.FrequencyResponseData) -> npt.NDArray[np.intp]:
         if len(highest) < PEAK_MARKS and all(abs(frequencies[k] - frequencies[other]) > CLOSE for other in highest):
             highest.append(k)
     return np.asarray(usable[np.union1d(spread, np.array(highest, dtype=np.intp))])
-
-
-def _on_branch(values: ComplexArray, phase: FloatArray) -> FloatArray:
-    """Give the phase of values on the turn nearest to a given one."""
-    angle = np.where(values == 0.0, np.nan, np.angle(values))
-    turns = np.round((phase - angle) / (2.0 * np.pi))
-    return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
 
 
 def dress_bode(

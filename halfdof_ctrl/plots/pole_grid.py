@@ -119,7 +119,7 @@ def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:
 
 
 def _axes_coordinates(ax: Axes, points: npt.NDArray[np.complexfloating]) -> FloatArray:
-    """Give where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
+    """Return where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
     return np.asarray((ax.transScale + ax.transLimits).transform(np.column_stack([points.real, points.imag])))
 
 

@@ -9,12 +9,13 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
-from halfdof_ctrl.descriptor.structure import pencil_structure, zeros
-from halfdof_ctrl.design.lqr import StateFeedback
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, UncertainRankError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.descriptor.finite_part import finite_part
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.descriptor.zeros import zeros
+from halfdof_ctrl.design.lqr import StateFeedback
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
 from halfdof_ctrl.plots.pole_grid import draw_pole_grid, mark_multiple, set_pole_axes
 from halfdof_ctrl.reduction.choose import exact_reduction
 

@@ -10,28 +10,24 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     AxesArray,
     AxesLike,
-    Units,
     draw_grid,
     finished_plot,
-    known_units,
     label_y,
     legend_prefix,
     no_lines,
-    plain,
     prepared_axes,
     require_system,
-    signal_label,
-    signal_names,
-    typeset,
 )
-from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.systems.step_times import relevant_poles, step_times
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
+from halfdof_ctrl.plots.units import Units, known_units, plain, signal_label, signal_names, typeset
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 
 NAMED_LINES = 8  #: recovered DOFs that the legend names
 MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn

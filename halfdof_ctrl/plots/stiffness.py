@@ -10,23 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.plots.axes import (
-    AxesArray,
-    AxesLike,
-    Units,
-    draw_grid,
-    finished_plot,
-    known_units,
-    label_y,
-    no_lines,
-    plain,
-    prepared_axes,
-    ratio_unit,
-)
-from halfdof_ctrl.plots.bode import continuous_phase
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_grid, finished_plot, label_y, no_lines, prepared_axes
+from halfdof_ctrl.plots.phase import continuous_phase
+from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
     dynamic_stiffness_response,
@@ -192,7 +181,7 @@ def transmissibility_plot(
 
 
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
-    """Give the models as a list, and the text of each in the legend; an underscore keeps it out."""
+    """Return the models as a list, and the text of each in the legend; an underscore keeps it out."""
     given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
     models = list(given) if isinstance(given, Iterable) else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
@@ -222,7 +211,7 @@ def _require_scales(xscale: str, yscale: str) -> None:
 
 
 def _ratio_unit(model: SecondOrderModel, units: Units, over: Sequence[str], under: Sequence[str]) -> str:
-    """Give the unit of a ratio in brackets, if all DOFs that move together have the same."""
+    """Return the unit of a ratio in brackets, if all DOFs that move together have the same."""
     known = known_units(model, units)
     found = {ratio_unit(above, below, known) for above in over for below in under}
     unit = found.pop()
@@ -257,7 +246,7 @@ def _dress(axes: AxesArray, xscale: Scale, yscale: Scale, *, Hz: bool, grid: boo
 
 
 def _drawn(ax: Axes) -> FloatArray:
-    """Give the ordinates of all curves that are finite."""
+    """Return the ordinates of all curves that are finite."""
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     return np.asarray(values[np.isfinite(values)])
 

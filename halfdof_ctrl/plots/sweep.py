@@ -9,15 +9,17 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.plots.axes import AxesArray, AxesLike, Units, draw_legend, draw_title, known_units, no_lines, prepared_axes
-from halfdof_ctrl.plots.bode import Scales, continuous_phase, dress_bode
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.plots.branches import followed
-from halfdof_ctrl.model.second_order import mechss
 from halfdof_ctrl.base.names import control_labels
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_legend, draw_title, no_lines, prepared_axes
+from halfdof_ctrl.plots.bode import Scales, dress_bode
+from halfdof_ctrl.plots.branches import followed
+from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.pole_grid import set_pole_axes
 from halfdof_ctrl.plots.pole_map import draw_plane
 from halfdof_ctrl.plots.sweep_colours import CaseColours, Numbers, coloured_cases
+from halfdof_ctrl.plots.units import Units, known_units
 from halfdof_ctrl.sweeps.result import SweepResult
 
 Kind: TypeAlias = Literal["bode", "poles"]
@@ -149,7 +151,7 @@ def _draw_curves(
 
 
 def _signal_units(result: SweepResult, units: Units) -> dict[str, str]:
-    """Give the units of the signals, as a model with the same DOFs has them."""
+    """Return the units of the signals, as a model with the same DOFs has them."""
     given = {name: unit for name, unit in (units or {}).items() if name not in result.parameters}
     own = {name: unit for name, unit in given.items() if name in {*result.inputs, *result.outputs} - {*result.dofs}}
     rest = {name: unit for name, unit in given.items() if name not in own}

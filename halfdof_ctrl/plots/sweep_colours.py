@@ -11,10 +11,11 @@ import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
-from halfdof_ctrl.plots.axes import AxesArray, Units, plain, typeset
-from halfdof_ctrl.sweeps.cases import Values, in_short
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.plots.axes import AxesArray
+from halfdof_ctrl.plots.units import Units, plain, typeset
+from halfdof_ctrl.sweeps.cases import Values, in_short
 from halfdof_ctrl.sweeps.result import SweepResult
 
 Colour: TypeAlias = tuple[float, float, float, float]
@@ -80,7 +81,7 @@ def coloured_cases(result: SweepResult, parameter: str | None, at: Mapping[str, 
 
 
 def _kept(result: SweepResult, at: Mapping[str, object]) -> Numbers:
-    """Give the numbers of the cases that were done and have the wanted values."""
+    """Return the numbers of the cases that were done and have the wanted values."""
     keep = np.ones(result.shape, dtype=bool)
     for name, value in at.items():
         _require_parameter(result, name)
@@ -137,6 +138,6 @@ def _are_same(first: object, second: object) -> bool:
 
 
 def _colourmap() -> LinearSegmentedColormap:
-    """Give viridis without its lightest part."""
+    """Return viridis without its lightest part."""
     whole = mpl.colormaps["viridis"]
     return LinearSegmentedColormap.from_list("viridis on white", whole(np.linspace(0.0, LIGHTEST, 256)))

@@ -44,12 +44,12 @@ class Cases:
         return math.prod(self.shape)
 
     def varied(self, number: int) -> dict[str, object]:
-        """Give the parameters of a case that are not the same for all."""
+        """Return the parameters of a case that are not the same for all."""
         place = np.unravel_index(number, self.shape)
         return {name: _plain(values[place]) for name, values in self.parameters.items()}
 
     def arguments(self, number: int) -> dict[str, object]:
-        """Give all parameters of a case."""
+        """Return all parameters of a case."""
         return self.fixed | self.varied(number)
 
 
@@ -108,7 +108,7 @@ def require_accepted(function: Callable[..., object], cases: Cases) -> None:
 
 
 def name_of(function: object) -> str:
-    """Give the name of a function as messages write it."""
+    """Return the name of a function as messages write it."""
     return str(getattr(function, "__qualname__", None) or type(function).__name__)
 
 
@@ -196,7 +196,7 @@ def _as_values(name: str, given: object) -> Values:
 
 
 def _plain(value: object) -> object:
-    """Give a Python number for a NumPy one."""
+    """Return a Python number for a NumPy one."""
     return value.item() if isinstance(value, np.generic) else value
 
 

@@ -15,12 +15,13 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.sweeps.cases import name_of
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, SingularLeadingMatrixError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import Names, force_names, motion_names, name_from_label, unknown_name_error
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.sweeps.cases import name_of
 from halfdof_ctrl.systems.frequency import frequency_response
 
 System: TypeAlias = SecondOrderModel | control.StateSpace
@@ -155,7 +156,7 @@ class Constant:
     system: SecondOrderModel
 
     def __call__(self) -> SecondOrderModel:
-        """Give the system."""
+        """Return the system."""
         return self.system
 
 
@@ -187,7 +188,7 @@ def selected(system: System, inputs: Names, outputs: Names) -> System:
 
 
 def signals_of(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Give the names of the inputs and of the outputs."""
+    """Return the names of the inputs and of the outputs."""
     if isinstance(system, SecondOrderModel):
         return system.inputs, system.outputs
     return tuple(map(name_from_label, system.input_labels)), tuple(map(name_from_label, system.output_labels))
@@ -248,7 +249,7 @@ def as_numbers(value: object) -> npt.NDArray[Any]:
 
 
 def _seen_dofs(model: SecondOrderModel) -> tuple[str, ...]:
-    """Give the DOFs whose force or motion is an input or output, from which the units of plots follow."""
+    """Return the DOFs whose force or motion is an input or output, from which the units of plots follow."""
     seen = {*model.inputs, *model.outputs}
     names = zip(model.dofs, force_names(model.dofs), *(motion_names(model.dofs, k) for k in range(3)), strict=True)
     return tuple([dof for dof, *motions in names if not seen.isdisjoint(motions)])

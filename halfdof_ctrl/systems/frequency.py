@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     ImproperError,
@@ -19,16 +18,19 @@ from halfdof_ctrl.base.errors import (
     SingularLeadingMatrixError,
     UncertainRankError,
 )
-from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.model.second_order import SecondOrderModel, null_column_kinds
-from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.base.names import control_label, control_labels
-from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.base.sparse_arrays import as_sparse
-from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
-from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.kinds import null_column_kinds
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
+from halfdof_ctrl.systems.hessenberg import state_space_response
+from halfdof_ctrl.systems.state_space import mech2ss
 
 NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
@@ -144,7 +146,7 @@ def frequency_response(
 
 
 def has_many_states(model: SecondOrderModel) -> bool:
-    """Tell whether a sparse model has so many states that its descriptor form is evaluated sooner than A, B, C, D."""
+    """Return whether a sparse model has so many states that its descriptor form is evaluated sooner than A, B, C, D."""
     if not model.is_sparse:
         return False
     inertial, half = null_column_kinds(model.M, model.C)
@@ -175,7 +177,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
 
 
 def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
-    """Give the lowest natural frequencies [rad/s] that are not zero, without damping."""
+    """Return the lowest natural frequencies [rad/s] that are not zero, without damping."""
     K, M = as_sparse(model.K), as_sparse(model.M)
     omega = np.zeros(0)
     if not (model.is_complex or is_unsymmetric(K) or is_unsymmetric(M)):

@@ -23,8 +23,8 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.systems.sparse_elimination import sparse_response
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
 BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
@@ -129,7 +129,7 @@ class ShiftedSolver:
         self.Q = (Q - np.outer(mirror, mirror @ Q))[:, :reached]  #: (N, reached) its orthonormal basis
 
     def solve(self, points: ComplexArray) -> ComplexArray:
-        """Give x, (reached, k), in the coordinates of Q."""
+        """Return x, (reached, k), in the coordinates of Q."""
         H = self.H
         n, k = H.shape[0], points.size
         x = np.empty((n, k), dtype=np.complex128)

@@ -1,13 +1,13 @@
 """Poles of a state space beside the finite eigenvalues of a model, matched one to one."""
 
 import numpy as np
-import scipy.linalg
 import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import ROUNDING, eigenvalues_and_rounding
+from halfdof_ctrl.base.words import in_words
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.spectrum import ROUNDING, eigenvalues_and_rounding
 
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding may move it
 BETWEEN = (0.0, 0.3, 0.7, 1.0)  #: parts of the way from an eigenvalue to its pole
@@ -55,10 +55,3 @@ def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: 
         smallest = scipy.linalg.svdvals((model.K + s * model.C + s**2 * model.M) * scale)[-1]
         distances.append(smallest / scipy.linalg.svdvals(size * scale)[0])
     return float(max(distances) / ROUNDING)
-
-
-def in_words(s: complex) -> str:
-    """Write a complex frequency with four digits."""
-    if s.imag == 0.0:
-        return f"{s.real:.4g}"
-    return f"{s.real:.4g}{s.imag:+.4g}j" if s.real != 0.0 else f"{s.imag:.4g}j"

@@ -81,7 +81,7 @@ def _side_by_side(
 def _eliminated(
     matrix: list[Row], right: list[complex | ComplexArray]
 ) -> tuple[list[Row], list[complex | ComplexArray]]:
-    """Give the upper triangle and the right-hand side after elimination."""
+    """Return the upper triangle and the right-hand side after elimination."""
     upper: list[Row] = []
     reduced: list[complex | ComplexArray] = []
     for p, given in enumerate(matrix):

@@ -13,11 +13,13 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ImproperError, ParameterError, SignalNameError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
-from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.method.signals import Signal
 
 Improper: TypeAlias = Literal["refuse", "drop"]
 

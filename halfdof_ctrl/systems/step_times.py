@@ -127,7 +127,7 @@ def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.
 
 
 def _default_horizon(moving: ComplexArray) -> float:
-    """Give the time [s] until the slowest mode has settled or swung long enough, or an unstable one has grown."""
+    """Return the time [s] until the slowest mode has settled or swung long enough, or an unstable one has grown."""
     if moving.size == 0:
         return NO_SCALE
     with np.errstate(divide="ignore", over="ignore"):

@@ -17,12 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
-from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, MARGIN, checked_frequencies, default_frequencies
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
@@ -237,7 +239,7 @@ def motion_frequencies(
 def _driven_response(
     model: SecondOrderModel, moved: Names, s: npt.ArrayLike, *, forced: Names = None, shown: Names = None
 ) -> ComplexArray:
-    """Give motions that are shown, and reactions, per force and per motion that is prescribed."""
+    """Return motions that are shown, and reactions, per force and per motion that is prescribed."""
     coefficients, left = _driven(model, moved, forced, shown)
     if left is not None:
         require_regular(left)
@@ -247,7 +249,7 @@ def _driven_response(
 def _driven(
     model: SecondOrderModel, moved: Names, forced: Names = None, shown: Names = None
 ) -> tuple[tuple[Coefficients, Coefficients, Coefficients, Coefficients], SecondOrderModel | None]:
-    """Give the coefficients of equation (1) with a motion prescribed, and the model of the DOFs left, if any."""
+    """Return the coefficients of equation (1) with a motion prescribed, and the model of the DOFs left, if any."""
     base = _at_rest(model)
     places = places_of_dofs(base, moved)
     force, motion = _units(base, forced), _units(base, shown).T
@@ -270,7 +272,7 @@ def _at_rest(model: SecondOrderModel) -> SecondOrderModel:
 
 
 def _units(model: SecondOrderModel, names: Names) -> FloatArray:
-    """Give a column for each of the DOFs with 1 in its place."""
+    """Return a column for each of the DOFs with 1 in its place."""
     places = [] if names is None else places_of_dofs(model, names)
     columns = np.zeros((len(model.dofs), len(places)))
     columns[places, range(len(places))] = 1.0
@@ -284,7 +286,7 @@ def _require_single(names: Names, parameter: str, kind: TransmissibilityKind) ->
 
 
 def _shaped(values: ComplexArray, s: npt.ArrayLike) -> ComplexArray:
-    """Give values at points the shape of the points."""
+    """Return values at points the shape of the points."""
     return values.reshape(np.shape(s))
 
 

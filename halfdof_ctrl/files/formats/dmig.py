@@ -40,12 +40,12 @@ class _Entries:
 
 
 def has_dmig(content: bytes) -> bool:
-    """Tell whether there is a DMIG entry."""
+    """Return whether there is a DMIG entry."""
     return DMIG.search(content) is not None
 
 
 def has_extrn(content: bytes) -> bool:
-    """Tell whether there is an EXTRN entry."""
+    """Return whether there is an EXTRN entry."""
     return EXTRN.search(content) is not None
 
 
@@ -171,7 +171,7 @@ def _assembled(name: str, entries: _Entries) -> RawMatrix:
 
 
 def _bulk_entries(content: bytes, keyword: str) -> Iterator[tuple[list[str], int]]:
-    """Give the data fields of each entry of a keyword, without continuation marks, and the line it starts at."""
+    """Return the data fields of each entry of a keyword, without continuation marks, and the line it starts at."""
     fields: list[str] | None = None
     start = 0
     for number, whole in enumerate(content.split(b"\n"), start=1):

@@ -94,7 +94,7 @@ class _Bytes:
         return part
 
     def element(self) -> tuple[int, bytes]:
-        """Give type and data of the next element."""
+        """Return type and data of the next element."""
         tag = self.take(TAG)
         kind, length = np.frombuffer(tag, self.order + "u4").tolist()
         if kind >> 16:
@@ -105,7 +105,7 @@ class _Bytes:
         return kind, data
 
     def numbers(self) -> npt.NDArray[Any]:
-        """Give the next element as numbers."""
+        """Return the next element as numbers."""
         return self.as_numbers(*self.element())
 
     def as_numbers(self, kind: int, data: bytes) -> npt.NDArray[Any]:

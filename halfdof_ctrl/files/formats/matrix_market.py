@@ -79,7 +79,7 @@ def _kind(content: bytes) -> tuple[str, str, str]:
 
 
 def _sizes(content: bytes, count: int) -> tuple[list[int], int, int]:
-    """Give the sizes, where the entries start, and the line there."""
+    """Return the sizes, where the entries start, and the line there."""
     start, line = content.find(b"\n") + 1, 2
     while start:
         stop = content.find(b"\n", start)
@@ -113,7 +113,7 @@ def _coordinate(content: bytes, numbers: int, count: int, line: int) -> tuple[np
 def _array(
     content: bytes, numbers: int, shape: tuple[int, int], symmetry: str, line: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give the entries of an array, whose triangle is stored if it is symmetric."""
+    """Return the entries of an array, whose triangle is stored if it is symmetric."""
     rows, columns = shape
     first = {"general": 0, "symmetric": 0, "skew-symmetric": 1}[symmetry]
     stored = rows * columns if symmetry == "general" else rows * (rows + 1) // 2 - first * rows

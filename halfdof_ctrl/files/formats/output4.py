@@ -178,7 +178,7 @@ def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
 
 
 def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
-    """Give where records begin and end, each of which stands between two equal counts of its bytes."""
+    """Return where records begin and end, each of which stands between two equal counts of its bytes."""
     mark = struct.Struct(f"{order}I")
     place = 0
     while place < len(content):

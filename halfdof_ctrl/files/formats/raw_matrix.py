@@ -94,7 +94,7 @@ def assembled(
 
 
 def storage(matrix: csc_array) -> Storage:
-    """Tell where the off-diagonal entries of a matrix are.
+    """Return where the off-diagonal entries of a matrix are.
 
     "either" means in both triangles, but never both entries of a pair.
     """

@@ -71,7 +71,7 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
 
 
 def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Give parsed numbers as integers, and refuse fractions.
+    """Return parsed numbers as integers, and refuse fractions.
 
     Raises
     ------
@@ -87,7 +87,7 @@ def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], 
 
 
 def printable(text: bytes) -> str:
-    r"""Give a name or title of a file for people to read, whatever damage did to it.
+    r"""Return a name or title of a file for people to read, whatever damage did to it.
 
     >>> printable(b"KAAX \x00\n")
     'KAAX'
@@ -99,7 +99,7 @@ def printable(text: bytes) -> str:
 
 
 def is_cut_short(content: bytes) -> bool:
-    r"""Tell whether the last number of a text without a last line end has lost digits for sure.
+    r"""Return whether the last number of a text without a last line end has lost digits for sure.
 
     So it is where the numbers that end the lines before it all have one length and it has less.
 
@@ -162,7 +162,7 @@ class Lines:
         return int(self.ends.size)
 
     def __getitem__(self, number: int) -> bytes:
-        """Give a line, counted from zero, without its end."""
+        """Return a line, counted from zero, without its end."""
         return self.content[self._start(number) : int(self.ends[number])].rstrip(b"\r")
 
     def _start(self, number: int) -> int:

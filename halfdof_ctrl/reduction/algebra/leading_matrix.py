@@ -66,7 +66,7 @@ class LeadingMatrix:
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
 
     def best_scaling(self) -> tuple[FloatArray, FloatArray]:
-        """Give powers of two near the row and column factors with which W has its least 1-norm condition number.
+        """Return powers of two near the row and column factors with which W has its least 1-norm condition number.
 
         The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
         any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
@@ -96,12 +96,12 @@ class LeadingMatrix:
         return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
 
     def singular_values(self) -> FloatArray:
-        """Give the singular values of the matrix that was factorized."""
+        """Return the singular values of the matrix that was factorized."""
         L, U = np.tril(self.factors, -1) + np.eye(len(self.factors)), np.triu(self.factors)
         return np.asarray(scipy.linalg.svdvals(L @ U))
 
     def elimination_size(self) -> FloatArray:
-        """Give ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
+        """Return ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
         L, U = np.tril(np.abs(self.factors), -1) + np.eye(len(self.factors)), np.triu(np.abs(self.factors))
         order = np.arange(len(self.factors))
         for i, j in enumerate(self.pivots.tolist()):
@@ -113,7 +113,7 @@ class LeadingMatrix:
         return size
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
+        """Return ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
         if self.rows is None or self.columns is None or self.equilibrated is None:
             return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
         right = right * self.rows[:, None]

@@ -21,14 +21,9 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.sparse_products import exact_residual, times
 from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
-from halfdof_ctrl.base.sparse_arrays import (
-    SparseMatrix,
-    column_of_entries,
-    exact_residual,
-    largest_by_row_and_column,
-    times,
-)
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
 WIDTH = 8  #: right-hand sides worked at a time
@@ -83,13 +78,13 @@ class SparseLU:
         return self.rcond < min(self.rows.size * float(np.finfo(float).eps), SINGULAR)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
+        """Return ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
         solution = self._solved(right, "T")
         solution *= self.columns[:, None]
         return solution
 
     def solve_transposed(self, right: FloatArray) -> FloatArray:
-        """Give ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
+        """Return ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
 
         Where solutions are corrected, in extended precision: products in which terms cancel keep their digits.
         """
@@ -97,11 +92,11 @@ class SparseLU:
         return self._solved(right, "N")
 
     def column_sizes(self, solution: FloatArray) -> FloatArray:
-        """Give the largest entry of each column of what `solve` gave, in the units in which W is even."""
+        """Return the largest entry of each column of what `solve` gave, in the units in which W is even."""
         return largest_of_columns(solution / self.columns[:, None])
 
     def null_vector(self) -> FloatArray:
-        """Give a vector that the scaled matrix, if it is singular, makes zero, its largest entry one.
+        """Return a vector that the scaled matrix, if it is singular, makes zero, its largest entry one.
 
         By inverse iteration on the matrix with a diagonal of some 1e-12 added, which is singular in no case.
         """
@@ -125,12 +120,12 @@ class SparseLU:
 
 
 def largest_of_columns(matrix: FloatArray) -> FloatArray:
-    """Give the size of the largest entry of each column."""
+    """Return the size of the largest entry of each column."""
     return np.asarray(np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0)))
 
 
 def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
+    """Return powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
 
     Examples
     --------
@@ -154,7 +149,7 @@ def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tu
 
 
 def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
-    """Give factors as `scaling.levelling_factors` does, for a sparse matrix."""
+    """Return factors as `scaling.levelling_factors` does, for a sparse matrix."""
     size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
     column = column_of_entries(size)
     rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
@@ -168,13 +163,13 @@ def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArr
 
 
 def scaled_matrix(matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> SparseMatrix:
-    """Give ``diag(rows) matrix diag(columns)``."""
+    """Return ``diag(rows) matrix diag(columns)``."""
     data = matrix.data * rows[matrix.indices] * columns[column_of_entries(matrix)]
     return csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def is_nearly_symmetric(matrix: SparseMatrix) -> bool:
-    """Tell whether most entries have a partner across the diagonal."""
+    """Return whether most entries have a partner across the diagonal."""
     pattern = csc_array((np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
     return bool(pattern.multiply(pattern.T).nnz >= SYMMETRIC_SHARE * pattern.nnz)
 

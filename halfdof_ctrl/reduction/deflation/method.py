@@ -1,32 +1,34 @@
-"""The whole road for any regular pencil: scale, relax, realize, certify.
+"""The method by deflation, for any regular pencil: scale, relax, realize, prove.
 
 Decisions at the edge of rounding can be wrong. A deflation is taken only if it passes equation (19); where it
 does not, or where a pencil is called singular whose P(s) is not, the decisions are taken again with more or less
 caution about rounding errors. If none passes, the model is refused.
 """
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil
-from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
-from halfdof_ctrl.base.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.base.arrays import EPS, IndexArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.errors import CloseDecisionWarning, SingularPencilError, UncertainRankError, callers_level
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import derivative_name, listed
-from halfdof_ctrl.model.singular import causes, null_spaces
-from halfdof_ctrl.reduction.deflation.offsets import IndexArray, Offsets
-from halfdof_ctrl.reduction.dense.partition import RankDecision
-from halfdof_ctrl.model.refusals import singular_pencil_error
+from halfdof_ctrl.reduction.deflation.offsets import Offsets
+from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
-from halfdof_ctrl.reduction.deflation.row_system import EPS, Caution, RowSystem, Units, scaled_rows
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations
-from halfdof_ctrl.base.spectrum import balanced
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
+from halfdof_ctrl.reduction.deflation.states import StateSelection
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.method.evidence import RankDecision, warn_of_close_decisions, warn_of_lost_digits
+from halfdof_ctrl.reduction.method.masses import without_light_masses
+from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil, scaled_pencil
+from halfdof_ctrl.reduction.method.signals import Rounding, StateEquations, output_signal, without_rounding
+from halfdof_ctrl.reduction.method.units import Units
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 AS_GIVEN = Caution(0.0, 0.0)  #: entries are what they are to the last digit
@@ -35,60 +37,6 @@ LARGEST_EXACT = 60  #: equations up to which row operations are exact
 ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
 NOISE = 30.0  #: ... and below this times the error that was measured
 TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is rounding
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class StateSelection:
-    """The states of a deflated model: displacements, velocities and, rarely, higher derivatives of DOFs."""
-
-    dofs: tuple[str, ...]  #: names of the n DOFs
-    places: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
-    differentiations: dict[str, int]  #: how often the equation of a DOF was differentiated, if at all
-    evidence: tuple[RankDecision, ...]  #: blocks of J, equation (16)
-
-    @property
-    def method(self) -> Literal["deflation"]:
-        """The road."""
-        return "deflation"
-
-    @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return tuple([derivative_name(self.dofs[j], order, self.dofs) for j, order in self.places])
-
-    @property
-    def inertial(self) -> tuple[str, ...]:
-        """DOFs with two states or more."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count > 1])
-
-    @property
-    def half(self) -> tuple[str, ...]:
-        """DOFs with one state."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 1])
-
-    @property
-    def static(self) -> tuple[str, ...]:
-        """DOFs without a state: they follow from the others and the inputs."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
-
-    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
-        """Tell for each of the model's DOFs with less than two states whether it is half or static."""
-        return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
-
-    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
-        """Give the states that belong to displacements and velocities of all n DOFs; higher derivatives are zero."""
-        from_q, from_v = self.state_maps()[:2]
-        return np.asarray(from_q @ displacements + from_v @ velocities)
-
-    def state_maps(self) -> tuple[FloatArray, ...]:
-        """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""
-        maps = np.zeros((max([order for _, order in self.places], default=0) + 2, len(self.places), len(self.dofs)))
-        for index, (j, order) in enumerate(self.places):
-            maps[order, index, j] = 1.0
-        return tuple(maps[: max(2, len(maps) - 1)])
-
-    def _counts(self) -> list[int]:
-        return [int(count) for count in np.bincount([j for j, _ in self.places], minlength=len(self.dofs))]
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -101,50 +49,6 @@ class Deflated:
     rcond: float  #: smallest reciprocal condition number of the square systems (18)
     loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
     certified: bool  #: whether (19) holds, as it need not where `tol` was given
-
-
-def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
-    """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    _, units, pencil = _scaled(model)
-    return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
-
-
-def loss(model: SecondOrderModel, equations: StateEquations) -> float:
-    """Measure what state equations, from whatever road, lose against direct solves."""
-    pencil, scaled = _in_scaled_units(model, equations)
-    return pencil.losses(scaled).worst
-
-
-def expected_loss(model: SecondOrderModel, equations: StateEquations) -> float:
-    """Bound what state equations, from whatever road, lose by being rounded."""
-    pencil, scaled = _in_scaled_units(model, equations)
-    return pencil.expected_loss(scaled)
-
-
-def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
-    _, units, pencil = _scaled(model)
-    q, across = equations.displacement, units.inputs / units.columns[:, None]
-    scaled = StateEquations(
-        A=np.asarray(equations.A / units.time),
-        B=equations.B * units.inputs / units.time,
-        displacement=Signal(
-            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
-        ),
-        shift=(),
-    )
-    return pencil, scaled
-
-
-def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
-    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-    powers = np.arange(3)[:, None, None]
-    pencil = ScaledPencil(
-        P=system.matrix,
-        B=system.coefficients[:, :, system.size :],
-        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
-        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
-    )
-    return system, units, pencil
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
@@ -165,7 +69,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    system, units, pencil = _scaled(model)
+    system, units, pencil = scaled_pencil(model)
     decisions: tuple[BlockDecision, ...] = ()
     lossy: Deflated | None = None
     exactly = tol is None and system.size <= LARGEST_EXACT
@@ -203,7 +107,7 @@ def _realized(
 
 
 def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caution]]:
-    """Give the arithmetic and the caution to be tried in turn."""
+    """Return the arithmetic and the caution to be tried in turn."""
     rows = ExactRows.of(system) if exactly else None
     if rows is not None and not rows.exact:  # numbers like 0.1: what cancels leaves rounding in any arithmetic
         yield system, CAUTIONS[0]
@@ -279,3 +183,55 @@ def _uncertain_error(
         f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)
+
+
+def by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
+    """Reduce any regular model by deflation."""
+    result = deflated(model if tol is None else without_light_masses(model, tol), tol)
+    if result.certified:
+        warn_of_close_decisions(result.selection.evidence)
+        warn_of_lost_digits(result.loss, result.rcond)
+    else:
+        msg = (
+            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
+            "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
+        )
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    return ExactReduction(
+        model=model,
+        partition=result.selection,
+        leading=None,
+        equations=result.equations,
+        rcond=result.rcond,
+        known_rounding=result.rounding,
+        tol=tol,
+    )
+
+
+def index_of(reduction: ExactReduction) -> int:
+    """Find the index of the pencil (8) from the growth of its inverse.
+
+    With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass, the
+    transfer function grows as the inverse of (8) does.
+    """
+    model = reduction.model if reduction.tol is None else without_light_masses(reduction.model, reduction.tol)
+    unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
+    probe = replace(
+        model,
+        B=_beside(unit, zero),
+        Bv=_beside(zero, model.M),
+        Ba=_beside(zero, zero),
+        F=_beside(unit, zero).T,
+        G=_beside(zero, model.M.T).T,
+        H=_beside(zero, zero).T,
+        D=np.block([[zero, zero], [zero, -model.M]]),
+        Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
+        Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
+    )
+    result = deflated(probe, reduction.tol)
+    grown = output_signal(probe, result.equations, lambda: result.rounding)
+    return len(without_rounding(probe, grown, result.rounding).U)
+
+
+def _beside(left: Matrix, right: Matrix) -> Matrix:
+    return read_only(np.hstack([left, right]))

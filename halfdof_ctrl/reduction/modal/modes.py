@@ -17,7 +17,8 @@ from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, splu
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, times
+from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU
 
 FEW = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
@@ -48,7 +49,7 @@ class ShiftedStiffness:
         return None if factors.is_singular else cls(K=K, M=M, sigma=sigma, factors=factors)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
+        """Return ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
         solution = np.empty_like(right, order="F")
         for start in range(0, right.shape[1], WIDTH):
             span = slice(start, start + WIDTH)
@@ -57,7 +58,7 @@ class ShiftedStiffness:
         return solution
 
     def solve_sparse(self, right: SparseMatrix, what: str) -> FloatArray:
-        """Give ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
+        """Return ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
         solution = np.empty(right.shape, order="F")
         for start in progress(range(0, right.shape[1], WIDTH), what):
             span = slice(start, start + WIDTH)
@@ -74,7 +75,7 @@ class Modes:
 
 
 def is_unsymmetric(matrix: SparseMatrix) -> float:
-    """Give how far a matrix is from its transpose, relative to its largest entry; 0 where that is rounding."""
+    """Return how far a matrix is from its transpose, relative to its largest entry; 0 where that is rounding."""
     difference = csc_array(abs(matrix - matrix.T))
     largest = float(np.abs(matrix.data).max(initial=0.0))
     asymmetry = float(difference.data.max(initial=0.0)) / (largest or 1.0)

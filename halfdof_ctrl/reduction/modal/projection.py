@@ -6,10 +6,12 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES
-from halfdof_ctrl.base.sparse_arrays import SparseMatrix, times
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_products import times
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
 
 BLOCK = 32  #: motions that are multiplied at a time
 FAST = 1e-10  #: square of the band's upper end over a coordinate's own frequency up to which it needs no mass
@@ -64,7 +66,7 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
 
 
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
-    """Give ``basis^T matrix basis``, some columns at a time."""
+    """Return ``basis^T matrix basis``, some columns at a time."""
     product = np.empty((basis.shape[1], basis.shape[1]))
     for start in range(0, basis.shape[1], BLOCK):
         span = slice(start, start + BLOCK)
@@ -73,7 +75,7 @@ def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
 
 
 def _massless_columns(M: FloatArray, K: FloatArray, omega: float, kept: int) -> tuple[FloatArray, FloatArray | None]:
-    """Give the mass with null columns for all that has none, and the change of coordinates p = turn p' that it takes.
+    """Return the mass with null columns for all that has none, and the change of coordinates p = turn p' that it takes.
 
     A coordinate whose own frequency lies far above the band needs no mass. Where combinations v of the others have none
     but rounding, as many coordinates are made these combinations, ``p' = p`` for them; the mass of the others stays.
@@ -120,7 +122,7 @@ def _names(dofs: tuple[str, ...], motions: Motions, turn: FloatArray | None) -> 
 
 
 def _free_names(taken: set[str], stem: str, count: int | None = None) -> tuple[str, ...]:
-    """Give a name that no DOF has, or several with numbers."""
+    """Return a name that no DOF has, or several with numbers."""
     while True:
         names = [stem] if count is None else [f"{stem}{k}" for k in range(1, count + 1)]
         if not any(name + end in taken for name in names for end in DERIVATIVE_SUFFIXES):

@@ -22,7 +22,6 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -30,12 +29,14 @@ from halfdof_ctrl.base.errors import (
     TruncationWarning,
     callers_level,
 )
-from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel, mechss
-from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.reduction.modal.projection import projected
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
+from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
+from halfdof_ctrl.reduction.modal.projection import projected
 
 POINTS = 12  #: frequencies at which the error is measured, besides resonances
 RESONANCES = 6  #: lowest resonances of the small model at which the error is measured
@@ -189,7 +190,7 @@ def _require_symmetric(model: SecondOrderModel) -> None:
 
 
 def _band_top(parts: Parts, omega: FloatArray, f_max: float | None) -> float:
-    """Give the highest frequency of the band [Hz]."""
+    """Return the highest frequency of the band [Hz]."""
     if f_max is not None:
         return f_max
     if omega.size and omega[-1] > 0.0:
@@ -248,7 +249,7 @@ def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
 
 
 def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
-    """Give frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
+    """Return frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
     count = min(CANDIDATES, int(EFFORT / len(small.dofs) ** 3))
     above = motions.kept.size + np.flatnonzero(motions.omega > 2.0 * np.pi * top)
     if count < DOUBTFUL or above.size == 0:
@@ -269,7 +270,7 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
 
 
 def _resonances(small: SecondOrderModel, low: float, top: float) -> FloatArray:
-    """Give the lowest resonances in the band [Hz], of a model with damping."""
+    """Return the lowest resonances in the band [Hz], of a model with damping."""
     if not small.C.any():
         return np.zeros(0)
     size = np.diagonal(small.K) + (2.0 * np.pi * top) ** 2 * np.diagonal(small.M)

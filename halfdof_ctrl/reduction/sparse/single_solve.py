@@ -18,23 +18,17 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.progress import progress_bar
-from halfdof_ctrl.reduction.method.signals import absorbed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
-from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
-from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, largest_of_columns
-from halfdof_ctrl.reduction.sparse.partition import (
-    HALF,
-    INERTIAL,
-    STATIC,
-    SparsePartition,
-    has_dependent_columns,
-    select_sparse_columns,
-    sparse_bases,
-)
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, largest_of_columns
+from halfdof_ctrl.reduction.method.signals import absorbed
+from halfdof_ctrl.reduction.sparse.bases import sparse_bases
+from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
+from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
+from halfdof_ctrl.reduction.sparse.selection import has_dependent_columns, select_sparse_columns
 
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 
