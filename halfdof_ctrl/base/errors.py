@@ -138,6 +138,33 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class LawError(HalfdofError):
+    """A law that is not linear cannot do what its place in the model asks of it.
+
+    `element` is the element in words, `dofs` are those it acts on.
+    """
+
+    def __init__(self, message: str, *, element: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.element = element
+        self.dofs = dofs
+
+
+class NoAnswerError(LawError):
+    """During a run no motion answers a force, or a law gives NaN or Inf.
+
+    `time` [s] is when, `force` [N] what found no answer (NaN where a law gave NaN), `state` the state reached.
+    """
+
+    def __init__(
+        self, message: str, *, element: str, dofs: tuple[str, ...], time: float, force: float, state: tuple[float, ...]
+    ) -> None:
+        super().__init__(message, element=element, dofs=dofs)
+        self.time = time
+        self.force = force
+        self.state = state
+
+
 class ModelSizeError(HalfdofError):
     """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
 
@@ -215,5 +242,9 @@ class TruncationWarning(UserWarning):
     """A small model is far from the full one somewhere in the band that matters."""
 
 
+class LostStateWarning(UserWarning):
+    """The tangent of a nonlinear model has another number of states than the model, since a slope is zero there."""
+
+
 class InterruptedResponseWarning(UserWarning):
-    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""
+    """A response was stopped by the user; what it holds is right, but not all that was asked for."""

@@ -67,6 +67,8 @@ class Law:
     monotone: bool = True
     domain: tuple[float, float] = EVERYWHERE
     written: str | None = field(default=None, kw_only=True)  #: how a built-in law is typed; None for a user function
+    flat: bool = field(default=False, kw_only=True)  #: whether the force is known to stay the same over some way
+    beside: Callable[[float], "Law"] | None = field(default=None, kw_only=True)  #: the law with ``c x`` added, of c
 
     def __post_init__(self) -> None:
         """Check the parts, and difference a slope that is missing."""

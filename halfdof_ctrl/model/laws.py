@@ -62,6 +62,8 @@ def quadratic(c2: float, c1: float = 0.0) -> Law:
         bounds=_grown(a or b),
         monotone=rises,
         written=_written(quadratic, c2, c1),
+        flat=a == 0.0 and b == 0.0,
+        beside=partial(_beside, quadratic, c2, b),
     )
 
 
@@ -96,6 +98,7 @@ def power(c: float, exponent: float) -> Law:
         bounds=_grown(a),
         monotone=a >= 0.0,
         written=_written(power, c, exponent),
+        flat=a == 0.0,
     )
 
 
@@ -129,6 +132,8 @@ def cubic(k3: float, k1: float = 0.0) -> Law:
         bounds=_grown(a or b),
         monotone=rises,
         written=_written(cubic, k3, k1),
+        flat=a == 0.0 and b == 0.0,
+        beside=partial(_beside, cubic, k3, b),
     )
 
 
@@ -159,6 +164,8 @@ def bilinear(k_minus: float, k_plus: float) -> Law:
         bounds=(left, right) if left < right else None,
         monotone=a >= 0.0 and b >= 0.0,
         written=_written(bilinear, k_minus, k_plus),
+        flat=a == 0.0 or b == 0.0,
+        beside=partial(_bilinear_beside, a, b),
     )
 
 
@@ -202,6 +209,7 @@ def gap(k: float, upper: float, lower: float | None = None) -> Law:
         bounds=(left, right) if left < right else None,
         monotone=True,
         written=_written(gap, k, upper, lower),
+        flat=above + below > 0.0 or not a,
     )
 
 
@@ -238,6 +246,8 @@ def coulomb(F: float, v0: float, c: float = 0.0) -> Law:
         bounds=_grown(b) if b else (-a, a) if a > 0.0 else None,
         monotone=a >= 0.0 and b >= 0.0,
         written=_written(coulomb, F, v0, c),
+        flat=a == 0.0 and b == 0.0,
+        beside=partial(_coulomb_beside, a, width, b),
     )
 
 
@@ -280,6 +290,7 @@ def table(x: npt.ArrayLike, f: npt.ArrayLike, extend: Literal["linear"] | None =
         monotone=bool((np.diff(curve.values) >= 0.0).all()),
         domain=(float(curve.points[0]), float(curve.points[-1])) if extend is None else EVERYWHERE,
         written=f"table({', '.join(given)})",
+        flat=bool((np.diff(curve.values) == 0.0).any()) or (extend is not None and 0.0 in (first, last)),
     )
 
 
@@ -336,6 +347,18 @@ def _grown(coefficient: float) -> tuple[float, float] | None:
     return EVERYWHERE if coefficient > 0.0 else None
 
 
+def _beside(law: Callable[..., Law], curved: float, straight: float, c: float) -> Law:
+    return law(curved, straight + c)
+
+
+def _bilinear_beside(k_minus: float, k_plus: float, c: float) -> Law:
+    return bilinear(k_minus + c, k_plus + c)
+
+
+def _coulomb_beside(F: float, v0: float, viscous: float, c: float) -> Law:
+    return coulomb(F, v0, viscous + c)
+
+
 def _quadratic_force(c2: float, c1: float, x: Any) -> Any:  # noqa: ANN401
     return (c1 + c2 * abs(x)) * x
 
@@ -354,6 +377,8 @@ def _quadratic_inverse(c2: float, c1: float, f: Any) -> Any:  # noqa: ANN401
 
 
 def _power_force(c: float, p: float, x: Any) -> Any:  # noqa: ANN401
+    if isinstance(x, float):
+        return c * math.copysign(abs(x) ** p, x)
     return c * np.copysign(np.abs(x) ** p, x)
 
 
@@ -364,6 +389,8 @@ def _power_slope(c: float, p: float, x: Any) -> Any:  # noqa: ANN401
 
 
 def _power_inverse(c: float, p: float, f: Any) -> Any:  # noqa: ANN401
+    if isinstance(f, float):
+        return math.copysign((abs(f) / c) ** (1.0 / p), f)
     return np.copysign((np.abs(f) / c) ** (1.0 / p), f)
 
 
@@ -411,11 +438,13 @@ def _gap_slope(k: float, upper: float, lower: float, x: Any) -> Any:  # noqa: AN
 
 
 def _coulomb_force(F: float, v0: float, c: float, x: Any) -> Any:  # noqa: ANN401
+    if isinstance(x, float):
+        return F * (x / math.hypot(x, v0)) + c * x
     return F * (x / np.hypot(x, v0)) + c * x
 
 
 def _coulomb_slope(F: float, v0: float, c: float, x: Any) -> Any:  # noqa: ANN401
-    size = np.hypot(x, v0)
+    size = math.hypot(x, v0) if isinstance(x, float) else np.hypot(x, v0)
     return F * (v0 / size) ** 2 / size + c
 
 
