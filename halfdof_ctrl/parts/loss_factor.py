@@ -138,7 +138,7 @@ def with_maxwell_damping(
     )
     L, d = directions(lost, model.dofs, sparse=model.is_sparse)
     kappa = float(found(np.array([2.0 * np.pi * at])).real[0])
-    _require_static(K, lost, kappa, model, uniform=loss_factor is not None)
+    _require_static(model, (K, lost), (L, d), kappa, uniform=loss_factor is not None)
     parts = _realized(model, (K, lost), (L, d), found, kappa)
     rise = found(band_points((low, high))).real - kappa
     return MaxwellDampedModel(
@@ -180,9 +180,9 @@ def _what_is_lost(
             "'loss'."
         )
         raise ParameterError(msg, parameter="keep", value=keep)
-    lost = csc_array(K.imag)
+    lost = csc_array(K.imag, copy=True)
     lost.eliminate_zeros()
-    return csc_array(K.real), lost, np.ones_like, True
+    return csc_array(K.real, copy=True), lost, np.ones_like, True
 
 
 def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> tuple[Loss, bool]:
@@ -224,9 +224,15 @@ def _tabulated(table: object, band: tuple[float, float]) -> Loss:
 
 
 def _require_static(
-    K: SparseMatrix, lost: SparseMatrix, kappa: float, model: SecondOrderModel, *, uniform: bool
+    model: SecondOrderModel,
+    stiffness: tuple[SparseMatrix, SparseMatrix],
+    damped: tuple[SparseMatrix, FloatArray],
+    kappa: float,
+    *,
+    uniform: bool,
 ) -> None:
     """Refuse a static stiffness ``Ks = K - kappa K''`` that is negative in a direction in which K is not."""
+    (K, lost), (L, d) = stiffness, damped
     if uniform:
         if kappa >= 1.0:
             msg = (
@@ -237,7 +243,7 @@ def _require_static(
             raise ParameterError(msg, parameter="loss_factor", value=kappa)
         return
     if model.is_sparse:
-        worst, vector = _largest_ratio(K, lost)
+        worst, vector = _largest_ratio(K, L, d)
         negative = kappa * worst - 1.0
     else:
         values, vectors = scipy.linalg.eigh((K - kappa * lost).toarray())
@@ -254,20 +260,17 @@ def _require_static(
         raise ParameterError(msg, parameter="band", value=found)
 
 
-def _largest_ratio(K: SparseMatrix, lost: SparseMatrix) -> tuple[float, FloatArray]:
-    """Give the largest eigenvalue of ``K'' v = lambda K v`` of a sparse model, and its vector."""
-    touched = np.unique(lost.indices)
-    spread = np.zeros((K.shape[0], touched.size))
-    spread[touched, np.arange(touched.size)] = 1.0
+def _largest_ratio(K: SparseMatrix, L: SparseMatrix, d: FloatArray) -> tuple[float, FloatArray]:
+    """Give the largest eigenvalue of ``K'' v = lambda K v``, with K'' = L diag(d) L^T, and its vector."""
+    spread = L.toarray() * np.sqrt(d)
     try:
         factors = splu(K)
     except RuntimeError:  # exactly singular: a structure that floats
         factors = splu(csc_array(K + SHIFT * diags_array(np.abs(K.diagonal()))))
     solved = factors.solve(spread)
-    block = lost[:, touched][touched].toarray()
-    root = scipy.linalg.sqrtm(block).real
-    values, vectors = scipy.linalg.eigh(root @ (solved[touched] + solved[touched].T) / 2.0 @ root)
-    return float(values[-1]), np.asarray(solved @ (root @ vectors[:, -1]))
+    inner = spread.T @ solved
+    values, vectors = scipy.linalg.eigh((inner + inner.T) / 2.0)
+    return float(values[-1]), np.asarray(solved @ vectors[:, -1])
 
 
 def _realized(

@@ -26,7 +26,7 @@ from halfdof_ctrl.parts.rubber import generalized_maxwell
 ABOVE_SCATTER = 1.4  #: an rms larger than this many times the scatter is no scatter ...
 IN_ROWS = 0.4  #: ... if neighbours of the residual are correlated by more than this ...
 VISIBLE = 0.002  #: ... and it is larger than this part of the curve
-UNDETERMINED = 0.1  #: standard error of k0, in parts of the curve's lowest stiffness, that is said
+UNDETERMINED = 0.1  #: standard error of k0, in parts of it, from which on it is said
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -209,7 +209,8 @@ def _fit(
     words = _verdict(curve, series, rest, floor, fluid, follows=follows)
     if asked is not None and series.k.size < asked:
         words += f" {asked} branches were asked for; the others come out as nothing."
-    undetermined = not errors["k0"].item() <= UNDETERMINED * float(np.abs(measured).min()) / unit
+    size = max(k0, UNDETERMINED * float(np.abs(measured).min()))
+    undetermined = not errors["k0"].item() * unit <= UNDETERMINED * size
     if curve.static is None and undetermined:
         words += " The stiffness at rest is not determined by this band: pass static_stiffness."
     return PronyFit(
