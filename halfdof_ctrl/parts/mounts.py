@@ -9,6 +9,28 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import Link, linked
 
+SCHEME = """\
+         y  [ m ]
+      +-----+-----+
+      |     |     |
+      |   C_rs   K_v
+     K_r    |     |
+      |    (y1)  (y2)       y1, y2: nodes without mass, half DOFs
+      |     |     |
+      |   K_rs  +-+---+
+      |     |  K_s   C_h
+     -+-----+---+-----+-    ground
+"""  #: of `hydromount`, as the docstring has it
+
+
+def scheme_of(model: SecondOrderModel) -> str | None:
+    """Return the scheme of a model that is the paper's mount; None for any other.
+
+    >>> scheme_of(hydromount()) == SCHEME
+    True
+    """
+    return SCHEME if (model.name, model.dofs) == ("hydromount", ("y", "y1", "y2")) else None
+
 
 def hydromount(
     *,
@@ -30,11 +52,11 @@ def hydromount(
           |     |     |
           |   C_rs   K_v
          K_r    |     |
-          |    (y1)  (y2)         y1, y2: nodes without mass, half DOFs
+          |    (y1)  (y2)       y1, y2: nodes without mass, half DOFs
           |     |     |
-          |   K_rs  +-+--+
-          |     |  K_s  C_h
-         -+-----+---+----+--      ground
+          |   K_rs  +-+---+
+          |     |  K_s   C_h
+         -+-----+---+-----+-    ground
 
     DOF ``y`` is the mass on top, ``y1`` the node between the damper C_rs and the spring K_rs of the
     rubber, ``y2`` the node between the oil's spring K_v and the lower chamber. ``y1`` and ``y2`` have no

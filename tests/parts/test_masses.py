@@ -59,7 +59,7 @@ def test_inertia_of_no_body_is_refused(inertia: object, words: str) -> None:
 
 def test_other_bad_input_is_refused() -> None:
     """Places that are none, masses that are none, rotations of a point."""
-    with pytest.raises(ParameterError, match="Point 'p' is at .* three numbers"):
+    with pytest.raises(ParameterError, match=r"Point 'p' is at .* three numbers"):
         hd.rigid_body(1.0, [1, 1, 1], {"p": (1, 2)})
     with pytest.raises(ParameterError, match="every coordinate must be a finite number"):
         hd.rigid_body(1.0, [1, 1, 1], {"p": (1, 2, np.nan)})

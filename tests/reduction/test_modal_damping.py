@@ -54,7 +54,7 @@ def test_rigid_motion_is_not_damped() -> None:
     assert_allclose(damped.C @ np.ones(3), 0.0, atol=1e-9)
 
 
-def test_imaginary_part_of_K_says_what_each_mode_loses() -> None:
+def test_imaginary_part_of_stiffness_says_what_each_mode_loses() -> None:
     """``zeta_r = phi^T K'' phi / (2 w^2)``; for K'' = eta K the same as one loss factor."""
     M, K = chain()
     uniform = hd.with_modal_damping(hd.mechss(M, None, K), 0.1)

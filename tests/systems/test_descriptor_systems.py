@@ -80,7 +80,7 @@ def test_inverse_of_a_lag_is_refused_with_its_polynomial() -> None:
     assert_allclose(dropped.D, [[1.0]])
 
 
-def test_regular_E_is_an_ordinary_system() -> None:
+def test_regular_leading_matrix_is_an_ordinary_system() -> None:
     """``E^-1 A``, and None for the unit matrix."""
     g = np.random.default_rng(0)
     A, E = g.standard_normal((3, 3)), g.standard_normal((3, 3)) + 3 * np.eye(3)
