@@ -10,7 +10,7 @@ from halfdof_ctrl.files.tables import save_response
 from halfdof_ctrl.model import laws
 from halfdof_ctrl.model.descriptor_form import DescriptorForm
 from halfdof_ctrl.model.descriptor_system import DescriptorSystem, dss
-from halfdof_ctrl.model.elements import Damper, Spring
+from halfdof_ctrl.model.elements import Damper, Force, Spring
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.assemble import assemble
@@ -18,7 +18,7 @@ from halfdof_ctrl.parts.hydraulic import Decoupler, hydraulic_mount
 from halfdof_ctrl.parts.joints import Joint, Rigid
 from halfdof_ctrl.parts.loss_factor import MaxwellDampedModel, with_maxwell_damping
 from halfdof_ctrl.parts.masses import point_mass, rigid_body
-from halfdof_ctrl.parts.mounts import hydromount
+from halfdof_ctrl.parts.mounts import hydromount, hydromount_part
 from halfdof_ctrl.parts.prony import PronyFit, fit_prony
 from halfdof_ctrl.parts.rubber import generalized_maxwell, inerter, kelvin_voigt, maxwell, zener
 from halfdof_ctrl.plots import (
@@ -52,6 +52,7 @@ __all__ = [
     "DescriptorForm",
     "DescriptorSystem",
     "ExactReduction",
+    "Force",
     "HalfdofError",
     "Joint",
     "MaxwellDampedModel",
@@ -78,6 +79,7 @@ __all__ = [
     "generalized_maxwell",
     "hydraulic_mount",
     "hydromount",
+    "hydromount_part",
     "inerter",
     "inspect_files",
     "kelvin_voigt",

@@ -36,7 +36,7 @@ LETTERS = ("M", "C", "K")
 def assemble(
     parts: Mapping[str, SecondOrderModel],
     *,
-    joints: Sequence[Rigid | Joint] = (),
+    joints: Sequence[Rigid | Joint] | Rigid | Joint = (),
     ground: Names = (),
     name: str | None = None,
 ) -> SecondOrderModel: ...
@@ -44,14 +44,14 @@ def assemble(
 def assemble(
     parts: Mapping[str, SecondOrderModel],
     *,
-    joints: Sequence[AnyJoint],
+    joints: Sequence[AnyJoint] | AnyJoint,
     ground: Names = (),
     name: str | None = None,
 ) -> SecondOrderModel | NonlinearModel: ...
 def assemble(
     parts: Mapping[str, SecondOrderModel],
     *,
-    joints: Sequence[AnyJoint] = (),
+    joints: Sequence[AnyJoint] | AnyJoint = (),
     ground: Names = (),
     name: str | None = None,
 ) -> SecondOrderModel | NonlinearModel:
@@ -97,12 +97,12 @@ def assemble(
     >>> model.dofs, model.K.tolist()
     (('body_z',), [[20000.0]])
     """
-    parts, joints = _with_joined_models(parts, joints)
+    parts, every = _with_joined_models(parts, joints)
     points = points_of(parts)
     held = as_tuple(ground)
-    _require_joined(parts, points, joints, held)
+    _require_joined(parts, points, every, held)
     ties = Ties(points.dofs)
-    for joint in joints:
+    for joint in every:
         if isinstance(joint, Rigid):
             _tie(ties, points, joint)
     for point in held:
@@ -112,22 +112,22 @@ def assemble(
     if not kept:
         msg = f"The ground and the joints leave nothing to move of {listed(list(parts))}. Free one of the points."
         raise AssemblyError(msg, names=held)
-    linear = [joint for joint in joints if isinstance(joint, Spring | Damper) and joint.is_linear]
+    linear = [joint for joint in every if isinstance(joint, Spring | Damper) and joint.is_linear]
     model = _joined(parts, points, ties, (T, kept), linear, name)
-    others = [joint for joint in joints if isinstance(joint, Spring | Damper) and not joint.is_linear]
+    others = [joint for joint in every if isinstance(joint, Spring | Damper) and not joint.is_linear]
     if not others:
         return model
     return nlmechss(model, [_renamed(element, points, ties) for element in others], name=name)
 
 
 def _with_joined_models(
-    parts: Mapping[str, SecondOrderModel], joints: Sequence[AnyJoint]
+    parts: Mapping[str, SecondOrderModel], joints: Sequence[AnyJoint] | AnyJoint
 ) -> tuple[dict[str, SecondOrderModel], list[AnyJoint]]:
     """Make every joint with a model a part with two ties."""
     found: list[AnyJoint] = []
     every = dict(parts) if isinstance(parts, Mapping) else parts  # `points_of` refuses what are no parts
     number = 0
-    for joint in joints:
+    for joint in (joints,) if isinstance(joints, Rigid | Spring | Damper | Joint) else joints:
         if not isinstance(cast("object", joint), Rigid | Spring | Damper | Joint):
             msg = f"{joint!r} is no joint: take Rigid, Spring, Damper or Joint."
             raise ParameterError(msg, parameter="joints", value=joint)

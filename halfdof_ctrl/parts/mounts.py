@@ -41,7 +41,6 @@ def hydromount(
     K_s: float = 500.0,
     C_rs: float = 100.0,
     C_h: float = 300.0,
-    ports: bool = False,
 ) -> SecondOrderModel:
     """Model a hydroelastic engine mount and the mass that it carries.
 
@@ -77,9 +76,6 @@ def hydromount(
         Stiffness of the secondary rubber [N/m].
     C_h : float
         Damping of the oil's flow through the holes [N s/m].
-    ports : bool
-        Whether what stands on the ground here is a port, so that the mount is a part for `halfdof_ctrl.assemble` with
-        the names of all mounts: ``top`` (y), ``bottom`` (the ground), ``1`` (y1), ``2`` (y2).
 
     Returns
     -------
@@ -109,8 +105,6 @@ def hydromount(
         if not (math.isfinite(value) and value >= 0.0):
             msg = f"{symbol} = {value}, but a stiffness [N/m] or damping [N s/m] must be a number that is not negative."
             raise ParameterError(msg, parameter=symbol, value=value)
-    if ports:
-        return _between_ports(m, {"K_r": K_r, "K_rs": K_rs, "K_v": K_v, "K_s": K_s, "C_rs": C_rs, "C_h": C_h})
     return mechss(
         [[m, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],
         [[C_rs, -C_rs, 0.0], [-C_rs, C_rs, 0.0], [0.0, 0.0, C_h]],
@@ -120,8 +114,42 @@ def hydromount(
     )
 
 
-def _between_ports(m: float, sizes: dict[str, float]) -> SecondOrderModel:
-    """Give the same mount with its ground as the DOF `bottom`."""
+def hydromount_part(
+    *,
+    m: float = 0.0,
+    K_r: float = 5000.0,
+    K_rs: float = 1000.0,
+    K_v: float = 500.0,
+    K_s: float = 500.0,
+    C_rs: float = 100.0,
+    C_h: float = 300.0,
+) -> SecondOrderModel:
+    """Make the mount of `hydromount` a part between two ports, for `halfdof_ctrl.assemble`.
+
+    Parameters
+    ----------
+    m : float
+        Mass at the top [kg]; none by default, since it is another part.
+    K_r, K_rs, K_v, K_s, C_rs, C_h : float
+        As in `hydromount`, with the paper's values.
+
+    Returns
+    -------
+    SecondOrderModel
+        DOFs ``top`` (y there), ``bottom`` (the ground there), and the half DOFs ``1`` (y1) and ``2`` (y2).
+
+    Raises
+    ------
+    ParameterError
+        As in `hydromount`.
+
+    Examples
+    --------
+    >>> hydromount_part().prescribe_motion("bottom").dofs
+    ('top', '1', '2')
+    """
+    fixed = hydromount(m=m, K_r=K_r, K_rs=K_rs, K_v=K_v, K_s=K_s, C_rs=C_rs, C_h=C_h)
+    sizes = {"K_r": K_r, "K_rs": K_rs, "K_v": K_v, "K_s": K_s, "C_rs": C_rs, "C_h": C_h}
     ends = {
         "K_r": ("top", "bottom"),
         "K_rs": ("1", "bottom"),
@@ -132,4 +160,4 @@ def _between_ports(m: float, sizes: dict[str, float]) -> SecondOrderModel:
     }
     links = [Link("K" if key[0] == "K" else "C", *pair, {"": sizes[key]}) for key, pair in ends.items()]
     part = linked(("top", "bottom", "1", "2"), links, ("",), "hydromount")
-    return mechss(np.diag([m, 0.0, 0.0, 0.0]), part.C, part.K, dofs=part.dofs, name=part.name)
+    return mechss(np.diag([m, 0.0, 0.0, 0.0]), part.C, part.K, dofs=part.dofs, name=fixed.name)

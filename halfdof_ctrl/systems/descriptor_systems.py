@@ -22,7 +22,8 @@ from halfdof_ctrl.base.errors import (
 )
 from halfdof_ctrl.base.names import Names, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
-from halfdof_ctrl.model.descriptor_system import DescriptorSystem, dss
+from halfdof_ctrl.model.descriptor_system import dss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import Improper, mech2ss
@@ -32,7 +33,7 @@ SHOWN = 4  #: pairs that a message spells out
 
 
 def dss2ss(
-    A: MatrixLike | DescriptorSystem,
+    A: MatrixLike | SecondOrderModel,
     B: MatrixLike | None = None,
     C: MatrixLike | None = None,
     D: MatrixLike | None = None,
@@ -48,7 +49,7 @@ def dss2ss(
 
     Parameters
     ----------
-    A : DescriptorSystem or (n, n) array_like
+    A : DescriptorSystem (or SecondOrderModel) or (n, n) array_like
         A system that `dss` made, or the matrix A; with a matrix the other arguments are those of `dss`.
     B, C, D, E : array_like, optional
         As in `dss`; only with a matrix A.
@@ -88,11 +89,11 @@ def dss2ss(
     if improper not in ("refuse", "drop"):
         msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
         raise ParameterError(msg, parameter="improper", value=improper)
-    if isinstance(A, DescriptorSystem):
+    if isinstance(A, SecondOrderModel):
         if any(value is not None for value in (B, C, D, E, states, inputs, outputs, name)):
             msg = "A descriptor system brings its matrices and names with it: use dss() or select() to change them."
             raise SignalNameError(msg, names=())
-        system = A
+        system: SecondOrderModel = A
     else:
         if B is None or C is None:
             msg = "dss2ss takes a system made by dss, or the matrices A, B, C, D, E."
@@ -105,7 +106,7 @@ def dss2ss(
     return mech2ss(reduction, improper=improper)
 
 
-def _reduced(system: DescriptorSystem) -> ExactReduction:
+def _reduced(system: SecondOrderModel) -> ExactReduction:
     """Reduce, with variables as states if there is a way."""
     try:
         reduction = exact_reduction(system)
@@ -122,7 +123,7 @@ def _reduced(system: DescriptorSystem) -> ExactReduction:
 
 
 def _in_variables(
-    system: DescriptorSystem, refusal: SingularPencilError | UncertainRankError | ComplexModelError
+    system: SecondOrderModel, refusal: SingularPencilError | UncertainRankError | ComplexModelError
 ) -> HalfdofError:
     """Say a refusal in words of variables and equations."""
     if isinstance(refusal, SingularPencilError):
@@ -150,7 +151,7 @@ def _in_variables(
     return ComplexModelError(msg, matrices=found)
 
 
-def _improper(system: DescriptorSystem, polynomial: Sequence[FloatArray]) -> ImproperError:
+def _improper(system: SecondOrderModel, polynomial: Sequence[FloatArray]) -> ImproperError:
     """Refuse what grows with frequency, with its polynomial part."""
     order = np.zeros(polynomial[0].shape, dtype=int)
     for power, part in enumerate(polynomial):

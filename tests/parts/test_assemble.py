@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import halfdof_ctrl as hd
+import halfdof_ctrl.nonlinear.reduction  # registers what nlmechss asks
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
-from halfdof_ctrl.parts.joints import AssemblyError
+from halfdof_ctrl.model.nonlinear import NonlinearModel
+from halfdof_ctrl.parts.joints import AnyJoint, AssemblyError
 
 BY_HAND = 1e-14  # the same sums in another order
 SOLVED = 1e-10  # two formulations of one model, each by a solve
@@ -126,7 +128,7 @@ def test_chain_of_parts_is_the_tridiagonal_one() -> None:
 def test_joint_with_a_model_is_a_part_tied_at_both_ends() -> None:
     """A Maxwell branch as a joint against the zener strut."""
     parts = {"body": hd.point_mass(400), "wheel": hd.point_mass(40)}
-    joints = [
+    joints: list[AnyJoint] = [
         hd.Spring("body_z", "wheel_z", 2e4),
         hd.Joint("body_z", "wheel_z", hd.maxwell(1e5, 1500), name="damper"),
         hd.Joint("wheel_z", None, hd.kelvin_voigt(2e5, 50)),
@@ -246,3 +248,36 @@ def test_what_is_no_part_or_joint_is_refused() -> None:
         hd.assemble({"a": 1.0})  # type: ignore[dict-item]
     with pytest.raises(ParameterError, match="'a_z' is no joint: take Rigid, Spring, Damper or Joint"):
         hd.assemble({"a": hd.point_mass(1)}, joints=["a_z"])  # type: ignore[list-item]
+
+
+def test_law_makes_the_model_nonlinear() -> None:
+    """A spring with a law sits on the DOFs that ties leave; linear elements go into K."""
+    parts = {"m": hd.point_mass(10), "s": hd.zener(1e4, 5e3, 100)}
+    stop = hd.Spring("s_top", None, hd.laws.gap(1e5, 0.01))
+    model = hd.assemble(parts, joints=[hd.Rigid("m_z", "s_top"), hd.Spring("m_z", None, 50.0), stop], ground="s_bottom")
+    assert isinstance(model, NonlinearModel)
+    assert [repr(element) for element in model.elements] == ['Spring("m_z", law=gap(1e5, 0.01))']
+    assert_array_equal(model.linear.K, [[15050, -5000], [-5000, 5000]])
+
+
+def test_law_at_a_point_that_is_no_dof_is_refused() -> None:
+    """On a rigid body's lever arm, on several axes, or between points that move as one."""
+    body = hd.rigid_body(5, [1, 1, 1], {"p": (1, 0, 0)})
+    for end, words in (("e_p_z", "e_p_z is no DOF of its own"), ("e_p", "e_p is a point with several axes")):
+        with pytest.raises(AssemblyError, match=words):
+            hd.assemble({"e": body}, joints=[hd.Spring(end, None, hd.laws.gap(1e5, 0.01))])
+    with pytest.raises(AssemblyError, match="its ends move as one"):
+        hd.assemble(
+            {"m": hd.point_mass(1), "s": hd.kelvin_voigt(1, 1)},
+            joints=[hd.Rigid("m_z", "s_top"), hd.Spring("m_z", "s_top", hd.laws.gap(1e5, 0.01))],
+            ground="s_bottom",
+        )
+
+
+def test_newcomers_model_needs_no_list_for_one_joint() -> None:
+    """A single joint and a single ground."""
+    parts = {"mass": hd.point_mass(2), "mount": hd.hydromount_part()}
+    model = hd.assemble(parts, joints=hd.Rigid("mass_z", "mount_top"), ground="mount_bottom")
+    paper = hd.hydromount(m=2)
+    for found, desired in ((model.M, paper.M), (model.C, paper.C), (model.K, paper.K)):
+        assert_array_equal(found, desired)

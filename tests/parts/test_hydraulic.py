@@ -1,5 +1,7 @@
 """The hydraulic mount against the closed form of Singh, Kim and Ravindra."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,7 @@ from halfdof_ctrl.base.errors import ParameterError
 
 ROUNDOFF = 1e-10  # a solve with pressures and displacements over 17 decades
 S = 2j * np.pi * np.geomspace(0.1, 300, 40)
-OIL = {"A": 2.5e-3, "I": 4.0e6, "R": 1.05e8, "C1": 3.0e-11, "C2": 2.6e-9}
+OIL: dict[str, Any] = {"A": 2.5e-3, "I": 4.0e6, "R": 1.05e8, "C1": 3.0e-11, "C2": 2.6e-9}
 
 
 def closed_form(k: float, c: float, decoupler: hd.Decoupler | None = None) -> np.ndarray:

@@ -23,7 +23,7 @@ def test_rlc_circuit_keeps_its_variables() -> None:
     """Source, R, L and C in a loop: currents and voltages by Kirchhoff, the capacitor's voltage over the source's."""
     R, L, C = 2.0, 0.5, 0.1
     E = np.diag([L, C, 0, 0.0])  # i, vc, vr, vl
-    A = [[0, 0, 0, 1], [1, 0, 0, 0], [-R, 0, 1, 0], [0, 1, 1, 1]]
+    A = np.array([[0, 0, 0, 1], [1, 0, 0, 0], [-R, 0, 1, 0], [0, 1, 1, 1]])
     sys = hd.dss2ss(A, [[0], [0], [0], [-1]], [[0, 1, 0, 0]], 0, E, states=["i", "vc", "vr", "vl"], inputs="source")
     assert sys.state_labels == ["i", "vc"]
     assert_allclose(sys(S), 1.0 / (L * C * S**2 + R * C * S + 1.0), rtol=SOLVED)
@@ -31,7 +31,7 @@ def test_rlc_circuit_keeps_its_variables() -> None:
 
 def test_variables_stay_where_bases_would_mix_them() -> None:
     """E without a null column: selection by deflation keeps x1 and x3 as states."""
-    E, A = [[1, 1, 0], [0, 0, 0], [0, 0, 1.0]], np.array([[-1, 0, 1.0], [1, -2, 0], [0, 1, -3]])
+    E, A = np.array([[1, 1, 0], [0, 0, 0], [0, 0, 1.0]]), np.array([[-1, 0, 1.0], [1, -2, 0], [0, 1, -3]])
     sys = hd.dss2ss(A, [[0], [1], [0]], np.eye(3), 0, E, states=["x1", "x2", "x3"])
     assert set(sys.state_labels) <= {"x1", "x2", "x3"}
     desired = np.array([np.linalg.solve(s * np.array(E) - A, [0, 1, 0]) for s in S]).T
