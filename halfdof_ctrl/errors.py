@@ -3,6 +3,7 @@
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
+    EnergyFormError,
     FailedCasesWarning,
     FileFormatError,
     HalfdofError,
@@ -30,6 +31,7 @@ from halfdof_ctrl.base.errors import (
 __all__ = [
     "CloseDecisionWarning",
     "ComplexModelError",
+    "EnergyFormError",
     "FailedCasesWarning",
     "FileFormatError",
     "HalfdofError",
