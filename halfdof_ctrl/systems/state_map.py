@@ -180,7 +180,7 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
     if states in ("dofs", "scaled"):
         return _map_of_dofs(reduction, states)
     form = energy_form(reduction.model)
-    return _map_of_form(modal_form(form) if states == "modal" else form, states, reduction)
+    return map_of_form(modal_form(form) if states == "modal" else form, states, reduction)
 
 
 def require_kind(states: str) -> None:
@@ -250,7 +250,7 @@ def _state_maps(reduction: ExactReduction) -> tuple[FloatArray, ...]:
     return of_q, of_v
 
 
-def _map_of_form(form: EnergyForm, states: States, reduction: ExactReduction) -> StateMap:
+def map_of_form(form: EnergyForm, states: States, reduction: ExactReduction) -> StateMap:
     """Return the map of energy coordinates, its T on the states that `mech2ss` gives by default."""
     require_same_order(form, reduction)
     T, T_inverse = form.T, form.T_inverse

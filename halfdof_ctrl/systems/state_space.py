@@ -30,7 +30,7 @@ from halfdof_ctrl.reduction.energy.modal import modal_form
 from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
-from halfdof_ctrl.systems.state_map import States, require_kind, require_same_order, scaled_units
+from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 Improper: TypeAlias = Literal["refuse", "drop"]
 
@@ -153,6 +153,21 @@ def _in_energy_states(reduction: ExactReduction, states: States) -> control.Stat
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return energy_state_space(modal_form(form) if states == "modal" else form)
+
+
+def system_of_map(states: StateMap) -> control.StateSpace:
+    """Make the state space in the states of a map; what is improper in it is left out."""
+    model, output = states.model, states.output
+    return labelled_system(
+        states.A,
+        states.B,
+        output.X,
+        output.direct(len(model.inputs)),
+        states=states.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=model.name,
+    )
 
 
 def energy_state_space(form: EnergyForm) -> control.StateSpace:

@@ -3,10 +3,10 @@
     x' = (J - R) Q x + B u,    J = -J^T,  R = R^T,    energy E = x^T Q x / 2                 (25)
     E' = -(Q x)^T R (Q x) + (Q x)^T B u
 
-in energy coordinates, Q the identity but for zeros at displacements of free motions, which hold no energy. With u = 0 the
-power lost is ``q'^T C q'``, so that R is positive semidefinite where the symmetric part of C is: what C says about its own
-entries decides, not eigenvalues of a large R. Where C is not, the most negative eigenvalue of R has a motion, and the
-DOFs at which its dampers feed energy in.
+in energy coordinates, Q the identity but for zeros at displacements of free motions, which hold no energy. With u = 0
+the power lost is ``q'^T C q'``, so that R is positive semidefinite where the symmetric part of C is: what C says about
+its own entries decides, not eigenvalues of a large R. Where C is not, the most negative eigenvalue of R has a motion,
+and there are DOFs at which its dampers feed energy in.
 """
 
 from dataclasses import dataclass
