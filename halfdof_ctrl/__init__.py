@@ -1,9 +1,9 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
-from halfdof_ctrl.base.errors import HalfdofError
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files.models import inspect_files, load_model, save_model
 from halfdof_ctrl.files.systems import load_system, save_system
 from halfdof_ctrl.files.tables import save_response
@@ -75,3 +75,8 @@ __all__ = [
     "write_report",
     "zeros",
 ]
+
+
+def __dir__() -> list[str]:
+    """Show the public names alone; the rooms of the package can still be imported."""
+    return [*__all__, "__version__", "errors"]

@@ -24,10 +24,11 @@ from halfdof_ctrl.files.writing import replacing
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
 from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.report import check_as_json, default_design, save_figure, write_report
+from halfdof_ctrl.report import check_as_json, default_design, write_report
 from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
 from halfdof_ctrl.systems.frequency import (

@@ -26,6 +26,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import StabilizationError, WeightError
 from halfdof_ctrl.base.names import force_names, listed, motion_names
 from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -105,7 +106,7 @@ class StateFeedback:
         lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
-        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
         return "\n".join([*lines, f"  closed-loop poles: {poles}"])
 
 
@@ -235,8 +236,9 @@ def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None
         if mode is not None:
             force = _best_force(reduction, mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and no input reaches it, so that no feedback "
-                f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is not stable and no input reaches it, "
+                f"so that no feedback stabilizes it. Actuate it: a force on DOF {force} moves it most "
+                f"(input F_{force})."
             )
             raise StabilizationError(msg, eigenvalue=eigenvalue, quantity=f"F_{force}")
     for eigenvalue in _axis_eigenvalues(A - B @ cross, right_too=False):
@@ -244,8 +246,9 @@ def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None
         if mode is not None:
             kind, dof = _largest_motion(reduction, mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost does not see it, so that the "
-                f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is undamped and the cost does not "
+                "see it, so that the optimal feedback leaves it where it is. Weight it: it shows most in the "
+                f"{kind} of DOF {dof}."
             )
             raise StabilizationError(
                 msg, eigenvalue=eigenvalue, quantity=motion_names((dof,), int(kind == "velocity"))[0]
@@ -273,8 +276,9 @@ def _axis_eigenvalues(A: FloatArray, *, right_too: bool) -> list[complex]:
 def _unsolved_error(poles: ComplexArray) -> StabilizationError:
     """Make the refusal where the solver failed although a gain exists."""
     worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    place = complex_in_words(worst, pair=True)
     msg = (
-        f"The solver found no stabilizing gain, although one exists: a pole stays at {_in_words(worst)} rad/s. The "
+        f"The solver found no stabilizing gain, although one exists: a pole stays at {place} rad/s. The "
         "weights may differ by too many powers of ten; bring Q and R closer together."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
@@ -309,10 +313,3 @@ def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str,
 
 def _eigenvalues(A: FloatArray) -> ComplexArray:
     return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
-
-
-def _in_words(value: complex) -> str:
-    """Write a pole with four digits, a pair as one."""
-    if abs(value.imag) <= UNREACHED * abs(value):
-        return f"{value.real:.4g}"
-    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"
