@@ -41,6 +41,7 @@ from halfdof_ctrl.systems.frequency import (
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.working_states import working_system
 
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
 _Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
@@ -135,7 +136,7 @@ def run_step(arguments: argparse.Namespace) -> int:
     model = _model(arguments)
     if kind in TABLE_ENDINGS:
         recovered = _with_recovered(model)
-        system = mech2ss(recovered)
+        system = working_system(recovered)
         times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
         save_response(control.step_response(system, times, squeeze=False), arguments.o)
     else:
@@ -147,7 +148,7 @@ def run_poles(arguments: argparse.Namespace) -> int:
     """Print the eigenvalues of both forms, or draw them."""
     _require_ending(arguments.o, FIGURE_ENDINGS)
     model = _model(arguments)
-    table = eigenvalue_table(model, mech2ss(model))
+    table = eigenvalue_table(model, working_system(model))
     if arguments.o is not None:
         save_figure(pole_map_plot(model, title=model.name), arguments.o)
     print(table)

@@ -94,12 +94,15 @@ def step_plot(
     reduction = exact_reduction(sysdata) if isinstance(sysdata, SecondOrderModel) else None
     sys: Any = sysdata if reduction is None else mech2ss(reduction)
     states = None if reduction is None else working_map(reduction)
-    if states is not None:
-        sys = system_of_map(states)
     if reduction is not None and reduction.model.is_sparse and len(reduction.model.dofs) > MOST_RECOVERED:
         reduction = None  # nobody could tell so many curves apart
-    motion = states if reduction is not None and states is not None else reduction
-    response = control.step_response(sys, _times(sys, motion, timepts), squeeze=False)
+    if states is not None and states.kind == "energy":
+        sys = system_of_map(states)
+        times = _times(sys, None if reduction is None else states, timepts)
+    else:
+        times = _times(sys, reduction, timepts)
+        sys = sys if states is None else system_of_map(states)
+    response = control.step_response(sys, times, squeeze=False)
     time, outputs = np.asarray(response.time), np.asarray(response.outputs)
     (p, m), panels = outputs.shape[:2], _panels(reduction, known)
     what = f"{p} outputs and {len(panels)} groups of recovered displacements in rows, {m} inputs in columns"

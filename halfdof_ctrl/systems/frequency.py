@@ -27,11 +27,10 @@ from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
-from halfdof_ctrl.systems.working_states import response_of_form, working_form
+from halfdof_ctrl.systems.working_states import response_of_form, working_form, working_matrix
 
 NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
@@ -173,7 +172,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         return default_frequencies(pencil_structure(model).finite_eigenvalues)
     if not has_many_states(model):
         try:
-            poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
+            poles, rounding = eigenvalues_and_rounding(working_matrix(model.select(model.inputs[0])))
             return default_frequencies(poles[np.abs(poles) > rounding])
         except NO_STATE_SPACE:
             pass

@@ -2,8 +2,8 @@
 
 A displacement is measured in 2^d of its unit, a velocity of the same DOF in 2^(d + b), so that A holds 2^b where
 ``q' = 1 v`` stood. Powers of two round nothing. Those of the DOFs bring rows and columns of A to one size
-(E. E. Osborne, 1960), one DOF after the other. Time that does so favours the fastest modes: on cantilevers of 10 to 80 elements
-python-control's evaluation is best, over a broad range, midway between that and the slowest mode.
+(E. E. Osborne, 1960), one DOF after the other. Time that does so favours the fastest modes: on cantilevers of 10
+to 80 elements python-control's evaluation is best, over a broad range, midway between that and the slowest mode.
 """
 
 import numpy as np

@@ -7,14 +7,18 @@ Models without energy coordinates (unsymmetric or indefinite M or K, constraints
 coordinates) are worked in DOF states, scaled by powers of two.
 """
 
+import control
 import numpy as np
+import scipy.linalg
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
+from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 
 SHARE = 1e-6  #: of |C_i| |x|: what less of an output is left, keeps fewer than ten digits in energy coordinates
 
@@ -42,6 +46,48 @@ def working_form(model: SecondOrderModel, order: int) -> EnergyForm | None:
     """Return the energy coordinates of a model that has `order` states, None where there are none."""
     form = None if model.is_sparse and _is_large(model) else energy_system(model)
     return form if form is not None and len(form.A) == order else None
+
+
+def working_matrix(model: SecondOrderModel) -> FloatArray:
+    """Return A in energy coordinates where the model has them, else in DOF states."""
+    reduction = exact_reduction(model)
+    form = working_form(model, reduction.order)
+    return reduction.A if form is None else form.A
+
+
+def model_poles(model: SecondOrderModel) -> ComplexArray:
+    """Return the poles of the state space of a model [rad/s], computed in the states that keep most digits.
+
+    Poles of motions that K and C leave free are exactly 0.
+
+    Raises
+    ------
+    ComplexModelError, SingularPencilError, UncertainRankError
+        What `exact_reduction` refuses.
+
+    Examples
+    --------
+    Two free masses joined by a spring:
+
+    >>> poles = model_poles(mechss([[2, 0], [0, 2]], None, [[9, -9], [-9, 9]]))
+    >>> int(np.count_nonzero(poles == 0.0)), float(np.abs(poles).max().round(12))
+    (2, 3.0)
+    """
+    A = working_matrix(model)
+    return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
+
+
+def working_system(model: SecondOrderModel) -> control.StateSpace:
+    """Return the state space in energy coordinates where the model has them, else in DOF states.
+
+    Raises
+    ------
+    ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
+        The model has no state space (see `mech2ss`).
+    """
+    sys = mech2ss(model)
+    form = working_form(model, sys.nstates)
+    return sys if form is None else energy_state_space(form)
 
 
 def response_of_form(
