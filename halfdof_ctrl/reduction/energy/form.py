@@ -2,7 +2,7 @@
 
 With K = U^T U, static DOFs first, U = [U_kk U_kr; 0 U_rr], L = U_rr^T, and M_ii = R^T R the states are
 
-    z = L^T q_r  (strain),   v = R q'_i  (momentum),   q'_c = C_cc^-1 (B_c u - L_c z - C_ci R^-1 v),       (23)
+    z = L^T q_r  (strain),   v = R q'_i  (momentum),   q'_c = C_cc^-1 (B_c u - L_c z - C_ci R^-1 v),       (26)
 
 and ``z^T z / 2 + v^T v / 2`` is the energy. The trailing block U_rr *is* the static condensation. With
 B_r := B_r - U_kr^T U_kk^-T B_k,
@@ -50,7 +50,7 @@ class EnergyForm:
     n_massive: int  #: number of them with mass, whose momenta come next
     n_strains: int  #: number of strains, which follow; the rest are momenta
     nearest: (
-        float  #: energy over rounding, ratio (22) over eps, of the softest motion that is not free; inf if not near
+        float  #: energy over rounding, ratio (25) over eps, of the softest motion that is not free; inf if not near
     )
 
     @property
@@ -143,7 +143,7 @@ def _mass_error(model: SecondOrderModel, parts: Parts) -> EnergyFormError:
 
 
 class _Assembly:
-    """The blocks of (23), for one model."""
+    """The blocks of (26), for one model."""
 
     def __init__(self, model: SecondOrderModel, parts: Parts, factor: StiffnessFactor, mass: FloatArray) -> None:
         self.model, self.parts, self.mass = model, parts, mass

@@ -3,7 +3,7 @@
 With Phi = null(K), the identity at the supports, QR with pivoting of R Phi_i = Q [R_1 R_2; 0 0] P^T tells the motions
 with mass from those without:
 
-    Phi_m = Phi P [R_1^-1; 0],  Phi_m,i^T M Phi_m,i = I,       Phi_0 = Phi P [-R_1^-1 R_2; I],  Phi_0,i = 0.       (24)
+    Phi_m = Phi P [R_1^-1; 0],  Phi_m,i^T M Phi_m,i = I,       Phi_0 = Phi P [-R_1^-1 R_2; I],  Phi_0,i = 0.       (27)
 
 Forces of dampers on them that are rounding of sums that cancel, as in a body that nothing ties to the ground, are zero.
 """

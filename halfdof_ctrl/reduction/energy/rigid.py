@@ -3,11 +3,11 @@
 A structure that floats has a K with null vectors Phi, exact ones for translations and some that hold to the rounding of
 the entries of K for rotations. With as many support DOFs 2 as there are free motions and the others 1,
 
-    K = U^T U,   U = [U_11 U_12],   Phi = [-U_11^-1 U_12; I],   U Phi = 0.                  (21)
+    K = U^T U,   U = [U_11 U_12],   Phi = [-U_11^-1 U_12; I],   U Phi = 0.                  (24)
 
 A motion counts as free if its energy is rounding of the terms that it is summed from,
 
-    |Phi^T K Phi| <= eps |Phi|^T |K| |Phi|,                                                 (22)
+    |Phi^T K Phi| <= eps |Phi|^T |K| |Phi|,                                                 (25)
 
 without a factor n: the first bending mode of a clamped beam of 20 000 DOFs stands at 0.12 eps. What tells it from a
 rotation is the next mode, whose ratio must be a thousand times larger.
@@ -25,8 +25,8 @@ from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
 SUSPICIOUS = 4.0  #: times n eps of the diagonal: a smaller pivot may stand for a free motion
-NEXT = 1e3  #: the ratio (22) of the next mode is larger than that of a free motion by this factor
-NEARLY_FREE = 30.0  #: times eps: a ratio (22) up to which rounding of K changes the motion visibly
+NEXT = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
+NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
 FORWARD = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
 INVERSE_ITERATIONS = 8
 REFINEMENTS = 2
@@ -39,8 +39,8 @@ class StiffnessFactor:
     U: FloatArray  #: (n - d, n) factor; upper triangular in the columns `carried`
     carried: IndexArray  #: (n - d,) DOFs that are no supports, ascending
     supports: IndexArray  #: (d,) DOFs at which the free motions are measured
-    motions: FloatArray  #: (n, d) Phi of equation (21), the identity at the supports
-    nearest: float  #: ratio (22) over eps of the softest motion that is not free, where it was looked for, else inf
+    motions: FloatArray  #: (n, d) Phi of equation (24), the identity at the supports
+    nearest: float  #: ratio (25) over eps of the softest motion that is not free, where it was looked for, else inf
 
 
 def stiffness_factor(K: FloatArray, first: int, names: tuple[str, ...]) -> StiffnessFactor:
@@ -162,7 +162,7 @@ def _null_vectors(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -
 
 
 def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> StiffnessFactor:
-    """Return the factor (21) and its null vectors, for given supports."""
+    """Return the factor (24) and its null vectors, for given supports."""
     carried = np.setdiff1d(np.arange(len(K)), supports)
     inner, beside = K[np.ix_(carried, carried)], K[np.ix_(carried, supports)]
     factor = corrected_factor(inner)
@@ -184,14 +184,14 @@ def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) 
 
 
 def _ratios(K: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return the ratios (22) over eps, signed, of some motions."""
+    """Return the ratios (25) over eps, signed, of some motions."""
     energy = np.einsum("ij,ij->j", motions, exact_product(K, motions))
     terms = np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions))
     return np.asarray(energy / np.where(terms > 0.0, terms * EPS, 1.0))
 
 
 def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) -> tuple[FloatArray, float]:
-    """Return those combinations of candidates that are free by (22), and the smallest ratio of the others."""
+    """Return those combinations of candidates that are free by (25), and the smallest ratio of the others."""
     if motions.shape[1] == 0:
         return motions, np.inf
     size = np.sqrt(np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions)))
@@ -210,7 +210,7 @@ def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) ->
 
 
 def _next_ratio(K: FloatArray, supports: IndexArray, motions: FloatArray) -> float:
-    """Return the ratio (22) over eps of the softest motion beside those given, by inverse iteration."""
+    """Return the ratio (25) over eps of the softest motion beside those given, by inverse iteration."""
     carried = np.setdiff1d(np.arange(len(K)), supports)
     factor = corrected_factor(K[np.ix_(carried, carried)])
     if factor is None or carried.size == 0:
