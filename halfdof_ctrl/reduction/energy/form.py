@@ -232,7 +232,7 @@ class _Assembly:
             part[z] = L.T @ direct
             pushed = B[self.i] - C[self.i] @ direct
             part[e] = free.complement.T @ solved(self.mass, pushed, transposed=True)
-            part[r] = free.massive_motions.T @ B - free.resisted @ direct
+            part[r] = free.balance.T @ B - free.resisted @ direct
             driven.append(part)
         return A, driven
 
@@ -263,7 +263,7 @@ class _Assembly:
         q_r[:, n_p + n_m : n_p + n_m + n_z] = held - free.massive_motions @ (free.momenta @ held[self.i])
         v_r[self.i, n_p + n_m + n_z :] = solved(self.mass, free.complement)
         v_r[self.c] = self._half_velocity()
-        v_r[:, n_p : n_p + n_m] += free.massive_motions
+        v_r[:, n_p : n_p + n_m] += free.carried
         inputs = [np.asarray(B, dtype=float) for B in trimmed((model.B, model.Bv, model.Ba))]
         to_half = [np.zeros((n_r, m)) for _ in inputs]
         for place, B in zip(to_half, self._inputs(), strict=False):

@@ -139,22 +139,39 @@ def _undecided(nearest: float, names: tuple[str, ...], candidates: IndexArray) -
 
 
 def _candidates(K: FloatArray, first: int, names: tuple[str, ...]) -> IndexArray:
-    """Return the DOFs whose pivots are small in a pivoted factorization, static DOFs going first."""
+    """Return the fewest DOFs without which K is positive definite, those with the smallest pivots."""
+    order, rank = _pivots(K, first, names)
+    for count in range(order.size - rank, order.size + 1):
+        candidates = np.sort(order[order.size - count :])
+        carried = np.setdiff1d(np.arange(len(K)), candidates)
+        if corrected_factor(K[np.ix_(carried, carried)]) is not None:
+            return candidates
+    raise indefinite_error("K", list(names[:first]))
+
+
+def _pivots(K: FloatArray, first: int, names: tuple[str, ...]) -> tuple[IndexArray, int]:
+    """Return the DOFs in the order of a pivoted factorization behind static ones, and how many pivots are not small."""
     n = len(K)
     schur = np.array(K[first:, first:])
     if first:
         U, failed = dpotrf(K[:first, :first], lower=0, clean=1)
-        if failed:
-            floating = names[failed - 1]
-            msg = (
-                f"There are no energy coordinates: static DOF {floating} (no mass, no damping) moves without any force "
-                "together with others of its kind, or K is indefinite there. Tie it with a spring or remove it."
-            )
-            raise EnergyFormError(msg, reason="floating", dofs=(floating,))
+        small = np.diagonal(U) ** 2 <= SUSPICIOUS * n * EPS * np.diagonal(K)[:first]
+        if failed or small.any():
+            raise _floating_error(names[failed - 1 if failed else int(np.argmax(small))])
         half = solved(U, K[:first, first:], transposed=True)
         schur -= half.T @ half
+    none = bool(np.diagonal(schur).max(initial=0.0) <= SUSPICIOUS * n * EPS)  # dpstrf asks it of later pivots only
     _, order, rank, _ = dpstrf(schur, tol=SUSPICIOUS * n * EPS)
-    return np.sort(first + order[rank:] - 1).astype(np.intp)
+    places = first + (np.arange(n - first) if none else order - 1)
+    return places.astype(np.intp), 0 if none else int(rank)
+
+
+def _floating_error(dof: str) -> EnergyFormError:
+    msg = (
+        f"There are no energy coordinates: static DOF {dof} (no mass, no damping) moves without any force, alone or "
+        "together with others of its kind, or the stiffness is negative there. Tie it with a spring or remove it."
+    )
+    return EnergyFormError(msg, reason="floating", dofs=(dof,))
 
 
 def _null_vectors(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> FloatArray:
