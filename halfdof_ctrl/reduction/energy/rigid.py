@@ -24,7 +24,7 @@ from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
-SUSPICIOUS = 4.0  #: times n eps of the diagonal: a smaller pivot may stand for a free motion
+SUSPICIOUS = 128.0  #: times n eps of the diagonal: a smaller pivot may stand for a motion that is free, or nearly
 NEXT = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
 NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
 FORWARD = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
@@ -121,7 +121,7 @@ def _require_diagonal(K: FloatArray, names: tuple[str, ...]) -> None:
 
 def indefinite_error(letter: str, dofs: list[str]) -> EnergyFormError:
     """Make the refusal of an energy that is negative in some motion."""
-    meaning = {"K": "elastic energy (negative stiffness, a follower force)", "M": "kinetic energy"}[letter]
+    meaning = {"K": "elastic energy (negative stiffness, a constraint)", "M": "kinetic energy"}[letter]
     msg = (
         f"There are no energy coordinates: {letter} is not positive semidefinite, so that a motion of DOFs "
         f"{', '.join(dofs[:8])} has negative {meaning}. Keep states='dofs', or 'scaled' for python-control."
