@@ -12,7 +12,7 @@ from support.figures import legend_texts, marked, mount, stiff
 
 
 def test_pole_map_shows_poles_eigenvalues_and_zeros() -> None:
-    """Crosses are the poles of the state space, circles the finite eigenvalues of the pencil, diamonds `zeros` of the model."""
+    """Crosses are the poles of the state space, circles the finite eigenvalues of the pencil, diamonds `zeros`."""
     cplt = pole_map_plot(mount())
     lines = cplt.lines[0, 0]
     poles = marked(lines, "poles of A")

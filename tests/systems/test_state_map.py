@@ -125,14 +125,14 @@ def test_improper_models_are_refused_in_all_states() -> None:
     model = mechss(None, None, [[2]], dofs="node").select(outputs="node_dot")
     for kind in ("scaled", "energy"):
         with pytest.raises(ImproperError, match="node_dot from F_node"):
-            mech2ss(model, states=kind)  # type: ignore[arg-type]
+            mech2ss(model, states=kind)
 
 
 def test_unknown_states_are_refused() -> None:
     """A word that is none of the four."""
     for function in (mech2ss, state_map):
         with pytest.raises(ParameterError, match="states must be one of 'dofs', 'scaled', 'energy', 'modal'"):
-            function(hydromount(), states="canonical")
+            function(hydromount(), states="canonical")  # type: ignore[arg-type]
 
 
 def test_small_masses_taken_as_none_have_no_energy_states() -> None:

@@ -1,6 +1,6 @@
 """The corrected Cholesky factor."""
 
-import mpmath
+import mpmath  # type: ignore[import-untyped]
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -37,7 +37,9 @@ def test_factor_follows_the_units_exactly(powers: list[int]) -> None:
     """Powers of two in the DOFs multiply the columns of the factor and change no digit."""
     K = np.array([[4.0, 1, 0, 0.3], [1, 5, 2, 0], [0, 2, 6, 1], [0.3, 0, 1, 3]])
     unit = 2.0 ** np.array(powers)
-    assert_array_equal(corrected_factor(unit[:, None] * K * unit), corrected_factor(K) * unit)
+    U = corrected_factor(K)
+    assert U is not None
+    assert_array_equal(corrected_factor(unit[:, None] * K * unit), U * unit)
 
 
 def test_no_factor_of_what_is_not_definite() -> None:
