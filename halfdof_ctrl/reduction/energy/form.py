@@ -157,6 +157,8 @@ class _Assembly:
         self.C = parts.C[np.ix_(moving, moving)]
         self.free: FreeMotions = free_motions(factor, n_k, self.i, mass, self.C)
         self.nearest = factor.nearest
+        self.half = self._half_velocity()  # q'_c of the states, less what v_r carries along
+        self.driven_half = [self.damping.solve(B[self.c]) for B in self._inputs()]
 
     def form(self) -> EnergyForm:
         """Put the blocks together."""
@@ -207,10 +209,9 @@ class _Assembly:
         n_p, n_m, n_z, n_e = free.count, free.massive, L.shape[1], free.complement.shape[1]
         size = n_p + n_m + n_z + n_e
         p, r, z, e = np.split(np.arange(size), np.cumsum([n_p, n_m, n_z]))
-        half = self._half_velocity()  # of the states, less Phi_c v_r
         velocity = np.zeros((len(L), size))  # q'_r less Phi v_r
         velocity[np.ix_(self.i, e)] = solved(self.mass, free.complement)
-        velocity[self.c] = half
+        velocity[self.c] = self.half
         A = np.zeros((size, size))
         A[p] = free.rates @ velocity[free.supports]
         A[np.ix_(p, r)] += free.carried_rates
@@ -224,9 +225,9 @@ class _Assembly:
         self._mirror(A, z, e)
         A += 0.0  # without negative zeros
         driven = []
-        for B in self._inputs():
+        for B, of_half in zip(self._inputs(), self.driven_half, strict=True):
             direct = np.zeros((len(L), B.shape[1]))
-            direct[self.c] = self.damping.solve(B[self.c])
+            direct[self.c] = of_half
             part = np.zeros((size, B.shape[1]))
             part[p] = free.rates @ direct[free.supports]
             part[z] = L.T @ direct
@@ -262,12 +263,12 @@ class _Assembly:
         held[self.strained] = solved(self.L[self.strained].T, np.eye(n_z))
         q_r[:, n_p + n_m : n_p + n_m + n_z] = held - free.massive_motions @ (free.momenta @ held[self.i])
         v_r[self.i, n_p + n_m + n_z :] = solved(self.mass, free.complement)
-        v_r[self.c] = self._half_velocity()
+        v_r[self.c] = self.half
         v_r[:, n_p : n_p + n_m] += free.carried
         inputs = [np.asarray(B, dtype=float) for B in trimmed((model.B, model.Bv, model.Ba))]
         to_half = [np.zeros((n_r, m)) for _ in inputs]
-        for place, B in zip(to_half, self._inputs(), strict=False):
-            place[self.c] = self.damping.solve(B[self.c])
+        for place, of_half in zip(to_half, self.driven_half, strict=False):
+            place[self.c] = of_half
         flexible = [solved(self.U_kk, solved(self.U_kk, B[parts.static], transposed=True)) for B in inputs]
         across = -solved(self.U_kk, self.U_kr)
         q, v = np.zeros((2, n, size))
