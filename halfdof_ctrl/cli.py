@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning
+from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning, own_messages, recording_warnings
 from halfdof_ctrl.commands import (
     BUILT_IN,
     REFUSED,
@@ -67,13 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
-    """Show each warning once, as a line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    """Show each of the package's warnings once, as a line."""
+    with recording_warnings() as caught:
         try:
             yield caught
         finally:
-            for message in dict.fromkeys(str(warning.message) for warning in caught):
+            for message in own_messages(caught):
                 _say("warning", message)
 
 

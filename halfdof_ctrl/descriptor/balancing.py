@@ -7,7 +7,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-SWEEPS = 10  #: equilibration passes over rows and columns
+BALANCING_SWEEPS = 10  #: equilibration passes over rows and columns
 SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
 
 
@@ -34,7 +34,7 @@ def balancing_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _with_maxima_near_one(size: FloatArray, rows: FloatArray, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-    for _ in range(SWEEPS):
+    for _ in range(BALANCING_SWEEPS):
         scaled = size * rows[:, None] * columns
         down, across = np.sqrt(scaled.max(axis=1, initial=0.0)), np.sqrt(scaled.max(axis=0, initial=0.0))
         rows, columns = rows / np.where(down > 0.0, down, 1.0), columns / np.where(across > 0.0, across, 1.0)

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import StabilizationError, WeightError
 from halfdof_ctrl.base.names import force_names, listed, motion_names
 from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
@@ -32,12 +32,11 @@ from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
 from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 
 UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
-MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
+AXIS_MARGIN = 10 * EPS  #: times N |A|: a pole nearer to the axis is not told from one on it
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -81,7 +80,7 @@ class StateFeedback:
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K
         partition = self.reduction.partition
-        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        maps = partition.state_maps()
         gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
         if len(gains) > DERIVATIVES:
             msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
@@ -216,7 +215,7 @@ def _solved(reduction: ExactReduction, cost: Cost, method: Literal["scipy", "sly
         raise _unsolved_error(_eigenvalues(A)) from cause
     gain, riccati = np.asarray(gain) + 0.0, np.asarray(riccati)
     poles = _eigenvalues(A - B @ gain)
-    margin = MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
+    margin = AXIS_MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
     if not np.isfinite(gain).all() or (poles.real >= -margin).any():
         raise _unsolved_error(poles)
     return gain, riccati

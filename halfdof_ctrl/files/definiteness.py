@@ -1,9 +1,9 @@
 """Inertia of a symmetric matrix: how many eigenvalues are positive, negative and zero.
 
 By Sylvester's law the signs of the eigenvalues stay when rows and columns are scaled alike, so the matrix gets a unit
-diagonal first, and zero means at most `ZERO` after that. The matrix falls into connected components. Small ones are
-solved densely. Of a large one, A, the triangular factors of ``A + ZERO I`` and ``A - ZERO I``, taken without
-exchanging rows, have as many negative pivots as there are eigenvalues below -ZERO and below ZERO. Where rows had to be
+diagonal first, and zero means at most z = `ZERO_VALUE` after that. The matrix falls into connected components. Small
+ones are solved densely. Of a large one, A, the triangular factors of ``A + z I`` and ``A - z I``, taken without
+exchanging rows, have as many negative pivots as there are eigenvalues below -z and below z. Where rows had to be
 exchanged, where the factors do not solve a system well, or where the component is too large for the time that a look
 at a file may take, the answer is that it is not known.
 """
@@ -20,11 +20,11 @@ from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-ZERO = 1e-12  #: of the matrix with unit diagonal
+ZERO_VALUE = 1e-12  #: of the matrix with unit diagonal
 DENSE_SIZE = 100  #: up to which a component is solved densely
 LARGEST_COMPONENT = 20_000  #: that is factorized
 BATCH = 2**22  #: entries of dense blocks that are held at once
-BACKWARD_ERROR = 1e-14  #: of a solution with the factors, above which their pivots are not believed
+UNBELIEVED_PIVOTS = 1e-14  #: of a solution with the factors, above which their pivots are not believed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -80,7 +80,7 @@ def inertia(matrix: csc_array, largest: int = LARGEST_COMPONENT) -> Inertia:
     scaled = csc_array(csc_array(_at_unit_diagonal(symmetric)[order])[:, order])
     signs = np.zeros(3, dtype=np.int64)
     for values in _small_spectra(scaled.tocoo(), label[order], first, sizes):
-        signs += [(values > ZERO).sum(), (values < -ZERO).sum(), (np.abs(values) <= ZERO).sum()]
+        signs += [(values > ZERO_VALUE).sum(), (values < -ZERO_VALUE).sum(), (np.abs(values) <= ZERO_VALUE).sum()]
     unknown = 0
     for start, size in zip(first[sizes > DENSE_SIZE].tolist(), sizes[sizes > DENSE_SIZE].tolist(), strict=True):
         part = csc_array(csc_array(scaled[:, start : start + size])[start : start + size])
@@ -126,7 +126,9 @@ def _small_spectra(
 
 def _by_pivots(part: csc_array) -> npt.NDArray[np.int64] | None:
     """Count signs by the pivots of two shifted matrices, None if these cannot be trusted."""
-    below, upto = (_negative_pivots(csc_array(part + shift * eye_array(part.shape[0]))) for shift in (ZERO, -ZERO))
+    below, upto = (
+        _negative_pivots(csc_array(part + shift * eye_array(part.shape[0]))) for shift in (ZERO_VALUE, -ZERO_VALUE)
+    )
     if below is None or upto is None or upto < below:
         return None
     return np.array([part.shape[0] - upto, below, upto - below])
@@ -142,6 +144,6 @@ def _negative_pivots(shifted: csc_array) -> int | None:
     probe = np.cos(np.arange(shifted.shape[0]))
     solution = factors.solve(probe)
     size = float(abs(shifted).sum(axis=0).max() * np.abs(solution).max() + np.abs(probe).max())
-    if not np.abs(probe - shifted @ solution).max() <= BACKWARD_ERROR * size:
+    if not np.abs(probe - shifted @ solution).max() <= UNBELIEVED_PIVOTS * size:
         return None
     return int((factors.U.diagonal() < 0.0).sum())

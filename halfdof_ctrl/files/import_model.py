@@ -1,6 +1,6 @@
 """Models from the files of finite-element programs, and what was found in any model file.
 
-Matrices come from `femfiles` or from the variables of one file (`containers`); here they become a `SecondOrderModel`,
+Matrices come from `assembly` or from the variables of one file (`containers`); here they become a `SecondOrderModel`,
 and what looks wrong about them becomes a warning.
 """
 
@@ -34,7 +34,7 @@ def import_model(
     remove_fixed: bool,
     matrices: Mapping[str, str] | None,
 ) -> SecondOrderModel:
-    """Read a model from the files of a finite-element program, see `files.load_model`."""
+    """Read a model from the files of a finite-element program, see `models.load_model`."""
     found = read_matrices(
         given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=FACTORIZE_NONE
     )
@@ -58,7 +58,7 @@ def import_report(
     matrices: Mapping[str, str] | None,
     largest: int = LARGEST_COMPONENT,
 ) -> ImportReport:
-    """Look at the files of a finite-element program, see `files.inspect_files`."""
+    """Look at the files of a finite-element program, see `models.inspect_files`."""
     return read_matrices(given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest).report
 
 

@@ -3,7 +3,7 @@
 | what | endings | content |
 |---|---|---|
 | model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, Ba, Dv, Da, prescribed if there), dofs, inputs, outputs, name |
-| model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `modelimport` |
+| model, read only | .mtx, .matrix, .op4, .pch, ... | what finite-element programs write, see `import_model` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
 | response | .csv | one row a frequency or time, see `save_response` |

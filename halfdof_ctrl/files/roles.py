@@ -12,13 +12,13 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-WORDS = {
+ROLE_WORDS = {
     "stif": "K", "stiff": "K", "stiffness": "K", "k": "K",
     "mass": "M", "m": "M",
     "dmpv": "C", "damp": "C", "damping": "C", "c": "C",
     "dmps": "S",
 }  # fmt: skip
-_ANY = "|".join(sorted(WORDS, key=len, reverse=True))
+_ANY = "|".join(sorted(ROLE_WORDS, key=len, reverse=True))
 PATTERNS = tuple(
     re.compile(pattern, re.IGNORECASE)
     for pattern in (
@@ -51,7 +51,7 @@ def role_of(path: Path) -> FileRole | None:
     for pattern in PATTERNS:
         match = pattern.fullmatch(path.stem)
         if match is not None:
-            return FileRole(WORDS[match["word"].lower()], (match["before"].lower(), match["after"].lower()))
+            return FileRole(ROLE_WORDS[match["word"].lower()], (match["before"].lower(), match["after"].lower()))
     return None
 
 

@@ -10,9 +10,7 @@ from pathlib import Path
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.files.formats import abaqus, dmig, output4
-from halfdof_ctrl.files.formats import harwell_boeing as harwellboeing
-from halfdof_ctrl.files.formats import matrix_market as matrixmarket
+from halfdof_ctrl.files.formats import abaqus, dmig, harwell_boeing, matrix_market, output4
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.naming import naming_the_file
@@ -20,7 +18,7 @@ from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_lab
 
 ENDINGS = (".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping")  #: in a folder
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
-LETTERS = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
+FEM_MATRICES = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
 SIGNALS = ("B", "F", "G", "H")  #: that a file of that very name may hold
 
 
@@ -66,7 +64,7 @@ def find_sources(given: Sequence[Path] | Mapping[str, Path], titles: Mapping[str
         A file is not there or cannot be read.
     """
     told = dict(given) if isinstance(given, Mapping) else {}
-    unknown = [letter for letter in (*told, *titles) if letter not in LETTERS]
+    unknown = [letter for letter in (*told, *titles) if letter not in FEM_MATRICES]
     if unknown:
         msg = f"{listed(unknown)} is no matrix of a model. Known: M, C, K and S (structural damping)."
         raise FileFormatError(msg, path="")
@@ -113,12 +111,12 @@ def _read(path: Path) -> list[RawMatrix] | tuple[str, ...]:  # noqa: PLR0911  # 
         msg = "the last number has fewer digits than those before it. The file is cut short: write or copy it anew."
         raise FileFormatError(msg, path="")
     doubts = () if content.endswith((b"\n", b"\r")) else (NO_LAST_LINE_END,)
-    if matrixmarket.is_matrix_market(content):
-        return [replace(matrixmarket.read_matrix_market(content), doubts=doubts)]
+    if matrix_market.is_matrix_market(content):
+        return [replace(matrix_market.read_matrix_market(content), doubts=doubts)]
     if path.suffix.lower() == ".mapping":
-        return harwellboeing.read_mapping(content)
-    if harwellboeing.is_harwell_boeing(content):
-        return [replace(harwellboeing.read_harwell_boeing(content), doubts=doubts)]
+        return harwell_boeing.read_mapping(content)
+    if harwell_boeing.is_harwell_boeing(content):
+        return [replace(harwell_boeing.read_harwell_boeing(content), doubts=doubts)]
     if output4.is_binary_output4(content) or output4.is_text_output4(content) or path.suffix.lower() == ".op4":
         return output4.read_output4(content)
     if abaqus.data_columns(content):
@@ -148,7 +146,7 @@ def _letter(path: Path, raw: RawMatrix) -> str | None:
 def _chosen(sources: Sequence[Source], told: Mapping[str, Path], titles: Mapping[str, str]) -> dict[str, Source]:
     """Find the one matrix for each letter."""
     chosen = {}
-    for letter in LETTERS:
+    for letter in FEM_MATRICES:
         candidates = _candidates(letter, sources, told, titles)
         if len(candidates) > 1:
             found = listed([source.words for source in candidates])

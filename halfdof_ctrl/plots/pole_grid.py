@@ -14,12 +14,12 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
-AT_ORIGIN = 1e-7  #: points below this part of the largest |s| do not decide on that
+WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
+ORIGIN_OF_MAP = 1e-7  #: points below this part of the largest |s| do not decide on that
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
-SAME = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
+SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -32,10 +32,10 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
         points = np.concatenate([points, [-1.0, 1.0, 1.0j, -1.0j]])
     size = np.abs(points)
     largest = float(size.max(initial=0.0)) or 1.0
-    smallest = float(size[size > AT_ORIGIN * largest].min(initial=largest))
+    smallest = float(size[size > ORIGIN_OF_MAP * largest].min(initial=largest))
     left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     height = float(np.abs(points.imag).max(initial=0.0))
-    if largest > WIDE * smallest and not discrete:
+    if largest > WIDE_PLANE * smallest and not discrete:
         linear = 10.0 ** np.floor(np.log10(smallest))
         for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
             set_scale("symlog", linthresh=linear)
@@ -83,9 +83,9 @@ def draw_pole_grid(ax: Axes) -> None:
 
 def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
     """Write the multiplicity beside points that coincide up to rounding."""
-    left, near_origin = points, AT_ORIGIN * np.abs(points).max(initial=0.0)
+    left, near_origin = points, ORIGIN_OF_MAP * np.abs(points).max(initial=0.0)
     while left.size:
-        same = np.abs(left - left[0]) <= SAME * np.abs(left[0]) + near_origin
+        same = np.abs(left - left[0]) <= SAME_POLE * np.abs(left[0]) + near_origin
         if np.count_nonzero(same) > 1:
             ax.annotate(
                 f"{np.count_nonzero(same)}x",

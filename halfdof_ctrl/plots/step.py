@@ -33,7 +33,7 @@ from halfdof_ctrl.systems.working_states import working_map
 
 NAMED_LINES = 8  #: recovered DOFs that the legend names
 MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn
-EVEN = 1e-6  #: relative differences between time steps that are rounding
+EVEN_STEPS = 1e-6  #: relative differences between time steps that are rounding
 
 
 def step_plot(
@@ -131,7 +131,7 @@ def _times(
     if timepts is not None and np.ndim(timepts) > 0:
         given = np.asarray(timepts, dtype=float)
         steps = np.diff(given) if given.ndim == 1 else np.zeros(0)
-        if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN * steps[0]).all():
+        if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN_STEPS * steps[0]).all():
             msg = (
                 "timepts must be rising, equidistant times [s], at least two, since python-control simulates on no "
                 "others: take numpy.linspace, or give the last time alone."

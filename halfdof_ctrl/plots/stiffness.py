@@ -13,7 +13,16 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_grid, finished_plot, label_y, no_lines, prepared_axes
+from halfdof_ctrl.plots.axes import (
+    USUAL_POINTS,
+    AxesArray,
+    AxesLike,
+    draw_grid,
+    finished_plot,
+    label_y,
+    no_lines,
+    prepared_axes,
+)
 from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
 from halfdof_ctrl.systems.stiffness import (
@@ -28,12 +37,14 @@ Models: TypeAlias = SecondOrderModel | Iterable[SecondOrderModel]
 Labels: TypeAlias = str | Sequence[str] | None
 
 SCALES: tuple[Scale, ...] = get_args(Scale)
-ANGLE_STEPS = {True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0), False: (1.0, 2.0, 5.0, 10.0)}  #: of ticks, by WIDE or not
-WIDE = 60.0  #: [deg] range of angles with ticks at parts of a right angle
-USUAL = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
-SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
-ROOM = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
-FLAT = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
+ANGLE_STEPS = {
+    True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0),
+    False: (1.0, 2.0, 5.0, 10.0),
+}  #: of ticks, wide or not
+WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
+STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
+ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
+CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
 
 
 def dynamic_stiffness_plot(
@@ -59,8 +70,8 @@ def dynamic_stiffness_plot(
     dof : str or sequence of str
         DOF that is moved, as in `dynamic_stiffness`.
     omega : (k,) array_like, optional
-        Frequencies [rad/s], the very points; also with `Hz`. By default those of `stiffness.motion_frequencies`,
-        the same for all models.
+        Frequencies [rad/s], the very points; also with `Hz`. By default the same for all models, those of
+        `~halfdof_ctrl.systems.stiffness.motion_frequencies`.
     ax : (2,) array_like of Axes, optional
         For the modulus and the loss angle.
     xscale, yscale : {"linear", "log"}
@@ -255,8 +266,8 @@ def _set_angle(ax: Axes) -> None:
     """Put ticks where angles are read, and show a constant angle as such."""
     angles = _drawn(ax)
     span = float(np.ptp(angles)) if angles.size else 0.0
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE])))
-    if angles.size and span < FLAT:
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE_ANGLES])))
+    if angles.size and span < CONSTANT_SPAN:
         ax.set_ylim(angles.mean() - 1.0, angles.mean() + 1.0)
 
 
@@ -267,11 +278,11 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = float(np.percentile(curve, USUAL))
-    if curve.max() - curve.min() <= FLAT * curve.max():
+    usual = float(np.percentile(curve, USUAL_POINTS))
+    if curve.max() - curve.min() <= CONSTANT_SPAN * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
-    elif curve.max() > SPIKE[scale] * usual:
-        ax.set_ylim(top=ROOM[scale] * usual)
+    elif curve.max() > STIFFNESS_SPIKE[scale] * usual:
+        ax.set_ylim(top=ROOM_ABOVE[scale] * usual)
     if scale == "linear" and ax.get_ylim()[0] < 0.0:
         ax.set_ylim(bottom=0.0)
 

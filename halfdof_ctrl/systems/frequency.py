@@ -12,16 +12,14 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.descriptor.structure import pencil_structure
@@ -32,14 +30,13 @@ from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 from halfdof_ctrl.systems.working_states import response_of_form, working_form, working_matrix
 
-NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
-MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
-AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
+GRID_MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
+POLE_AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
 FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
 
 
@@ -75,6 +72,9 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     -----
     InterruptedResponseWarning
         The user stopped it.
+    DataLimitWarning
+        Entries known to their last digit do not determine the response to 1e-6 of its value; the message names the
+        frequency where it is worst.
 
     Examples
     --------
@@ -88,7 +88,7 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     else:
         require_regular(model)
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
-        values = model(1j * frequencies, squeeze=False)
+        values = dense_frequency_response(model, frequencies)
     name = None if model.name is None else control_label(model.name)
     return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
 
@@ -133,7 +133,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
         form = working_form(sysdata, sys.nstates)
     else:
@@ -174,10 +174,10 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         try:
             poles, rounding = eigenvalues_and_rounding(working_matrix(model.select(model.inputs[0])))
             return default_frequencies(poles[np.abs(poles) > rounding])
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)
-    return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
+    return np.geomspace(omega[0] / GRID_MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
 
 
 def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
@@ -189,7 +189,7 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
             stiffness = ShiftedStiffness.factorized(K, M)
             if stiffness is not None:
                 omega = lowest_modes(stiffness, GRID_MODES).omega
-    moving = np.asarray(omega[omega > AT_ORIGIN * omega.max(initial=0.0)])
+    moving = np.asarray(omega[omega > POLE_AT_ORIGIN * omega.max(initial=0.0)])
     if moving.size == 0:
         require_regular(model)
         msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."
@@ -204,10 +204,10 @@ def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> Fl
     damped pole the frequencies that its peak needs.
     """
     size = np.abs(poles)
-    moving = poles[size > AT_ORIGIN * size.max(initial=0.0)]
+    moving = poles[size > POLE_AT_ORIGIN * size.max(initial=0.0)]
     if moving.size == 0:
         return np.geomspace(*FALLBACK_RANGE, points)
-    low, high = np.abs(moving).min() / MARGIN, np.abs(moving).max() * MARGIN
+    low, high = np.abs(moving).min() / GRID_MARGIN, np.abs(moving).max() * GRID_MARGIN
     peaks = moving[(moving.imag > 0.0) & (np.abs(moving.real) < 0.05 * moving.imag)]
     width = np.maximum(np.abs(peaks.real), 1e-6 * peaks.imag)
     near = peaks.imag[:, None] + width[:, None] * np.linspace(-4.0, 4.0, 17)

@@ -25,12 +25,12 @@ from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadrati
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, MARGIN, checked_frequencies, default_frequencies
+from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, GRID_MARGIN, checked_frequencies, default_frequencies
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
 
 LINEAR_MARGIN = 4.0  #: evenly spread frequencies reach this factor above the modes
-KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
+TRANSMISSIBILITY_KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
 
 
 def dynamic_stiffness(model: SecondOrderModel, dof: Names, s: npt.ArrayLike) -> ComplexArray:
@@ -122,8 +122,8 @@ def transmissibility(
     >>> complex(transmissibility(model, "mass", "foot", 1.0, kind="force"))
     (0.8+0j)
     """
-    if kind not in KINDS:
-        msg = f"kind must be {' or '.join(KINDS)}, not {kind!r}."
+    if kind not in TRANSMISSIBILITY_KINDS:
+        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
         raise ParameterError(msg, parameter="kind", value=kind)
     if kind == "motion":
         _require_single(to, "to", kind)
@@ -232,7 +232,7 @@ def motion_frequencies(
     frequencies = default_frequencies(np.concatenate(modes))
     if not linear:
         return frequencies
-    top = frequencies[-1] * LINEAR_MARGIN / MARGIN
+    top = frequencies[-1] * LINEAR_MARGIN / GRID_MARGIN
     return np.unique(np.concatenate([np.linspace(0.0, top, DEFAULT_POINTS), frequencies[frequencies < top]]))
 
 

@@ -28,7 +28,7 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
-TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
+MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
 LARGEST_LABEL = 2**31 - 1
 INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
 COMPONENT_BITS = 16
@@ -79,7 +79,7 @@ def read_abaqus(content: bytes) -> RawMatrix:
 
 
 def _declared(content: bytes) -> Declared:
-    found = TYPE.search(content[:65536])
+    found = MATRIX_TYPE.search(content[:65536])
     if found is None:
         return "unsaid"
     return "symmetric" if found[1].lower() == b"symmetric" else "general"

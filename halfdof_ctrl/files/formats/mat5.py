@@ -28,7 +28,7 @@ TAG = 8
 MOST_BYTES = 16 * DENSE_ROW_LIMIT**2 + 2**16  #: of one complex matrix with its tags
 PEEK = 2**12  #: bytes that hold the name of a variable
 MATRIX, COMPRESSED = 14, 15
-NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
 CELL, CHAR, SPARSE, OPAQUE = 1, 4, 5, 17
 NUMERIC = range(6, 16)
@@ -109,10 +109,10 @@ class _Bytes:
         return self.as_numbers(*self.element())
 
     def as_numbers(self, kind: int, data: bytes) -> npt.NDArray[Any]:
-        if kind not in NUMBERS:
+        if kind not in NUMBER_TYPES:
             msg = f"an element of type {kind} where numbers should be"
             raise ValueError(msg)
-        return np.frombuffer(data, self.order + NUMBERS[kind])
+        return np.frombuffer(data, self.order + NUMBER_TYPES[kind])
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,18 +23,17 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import Lines, fixed_width, printable
+from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
 
 SYMMETRIC_FORM = 6
 COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
-MARK = 4  #: bytes of a record's length
+RECORD_MARK = 4  #: bytes of a record's length
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
 NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
 CUT = "it ends within a matrix. The file is cut short."
 DAMAGED = "The file is damaged."
-LONGEST_LINE = 1024  #: characters
 
 
 @dataclass(slots=True)
@@ -138,7 +137,7 @@ def _opened(numbers: tuple[int, ...], name: str, length: int) -> _Matrix:
 
 def _byte_order(content: bytes) -> str | None:
     for order in "<>":
-        if int(np.frombuffer(content[:MARK].ljust(MARK, b"\0"), order + "u4")[0]) in HEADER_BYTES:
+        if int(np.frombuffer(content[:RECORD_MARK].ljust(RECORD_MARK, b"\0"), order + "u4")[0]) in HEADER_BYTES:
             return order
     return None
 
@@ -182,15 +181,15 @@ def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
     mark = struct.Struct(f"{order}I")
     place = 0
     while place < len(content):
-        stop = place + MARK + mark.unpack(content[place : place + MARK].ljust(MARK, b"\0"))[0]
-        closing = content[stop : stop + MARK]
-        if len(closing) < MARK:
+        stop = place + RECORD_MARK + mark.unpack(content[place : place + RECORD_MARK].ljust(RECORD_MARK, b"\0"))[0]
+        closing = content[stop : stop + RECORD_MARK]
+        if len(closing) < RECORD_MARK:
             raise FileFormatError(CUT, path="")
-        if closing != content[place : place + MARK] or (stop - place) % MARK:
+        if closing != content[place : place + RECORD_MARK] or (stop - place) % RECORD_MARK:
             msg = f"the record at byte {place} does not end as it begins. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        yield place + MARK, stop
-        place = stop + MARK
+        yield place + RECORD_MARK, stop
+        place = stop + RECORD_MARK
 
 
 def _sparse_column(
@@ -228,10 +227,10 @@ def _note(matrix: _Matrix, places: list[int], where: tuple[int, int, int], sizes
 
 def _gathered(content: bytes, matrix: _Matrix, places: list[int], real: np.dtype[Any]) -> npt.NDArray[np.float64]:
     """Take the values of all strings out of the file at once; records lie on multiples of four bytes."""
-    quarters = np.frombuffer(content, "u4", len(content) // MARK)
-    per_value = real.itemsize * matrix.per_value // MARK
+    quarters = np.frombuffer(content, "u4", len(content) // RECORD_MARK)
+    per_value = real.itemsize * matrix.per_value // RECORD_MARK
     lengths = np.array(matrix.counts, dtype=np.int64) * per_value
-    chosen = quarters[runs(np.array(places, dtype=np.int64) // MARK, lengths)]
+    chosen = quarters[runs(np.array(places, dtype=np.int64) // RECORD_MARK, lengths)]
     return chosen.view(real).astype(np.float64)
 
 

@@ -21,7 +21,6 @@ IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 
 MOST_ROWS = 20_000_000  #: index arrays of 160 MB; a header that says more than this and the file's length is damaged
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
-MATRIX_DIMENSIONS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -15,7 +15,8 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 
-BLOCK = 2**25  #: bytes that are parsed at once
+LONGEST_LINE = 1024  #: characters of a line of fixed fields; Fortran's own limit is 132
+TEXT_BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
 NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
 TAIL = 4096  #: bytes at the end of a text that are looked at
@@ -208,7 +209,7 @@ def _blocks(content: bytes, first_line: int) -> Iterator[tuple[bytes, int]]:
     """Cut the content at line ends, with the number of each block's first line."""
     start, line = 0, first_line
     while start < len(content):
-        stop = content.find(b"\n", min(start + BLOCK, len(content)))
+        stop = content.find(b"\n", min(start + TEXT_BLOCK, len(content)))
         stop = len(content) if stop < 0 else stop + 1
         block = content[start:stop]
         yield block, line

@@ -34,6 +34,8 @@ SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal
 SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
 SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
+DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
+CHEAP = 1000  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
@@ -55,11 +57,11 @@ class SparseLU:
     def factorized(cls, matrix: SparseMatrix) -> "SparseLU":
         """Equilibrate, factorize and estimate the condition.
 
-        Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
-        logarithms of its entries, which does not depend on units, and judged again.
+        Even maxima may leave a matrix badly scaled still: one that looks singular, or ill conditioned if it is small,
+        is scaled by the means of the logarithms of its entries, which does not depend on units, and judged again.
         """
         first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
-        if not first.is_singular:
+        if not first.is_singular and (first.rcond >= DOUBTFUL or matrix.shape[0] > CHEAP):
             return first
         second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
         return second if second.rcond > first.rcond else first
@@ -197,13 +199,21 @@ def _attempt(matrix: SparseMatrix, ordering: Any, threshold: float) -> Any:  # n
 
 
 def _reciprocal_condition(scaled: SparseMatrix, factors: Any) -> float:  # noqa: ANN401  # SuperLU has no public type
-    """Estimate the reciprocal 1-norm condition number (N. J. Higham and F. Tisseur, 2000)."""
+    """Estimate the reciprocal 1-norm condition number.
+
+    By the iteration of N. J. Higham and F. Tisseur (2000) with one column, and, as LAPACK does, by a vector of rising
+    size and alternating sign: what is nearly singular by cancellation may be invisible to the constant vector with
+    which the iteration begins.
+    """
+    n = scaled.shape[0]
     inverse = LinearOperator(
         scaled.shape,
         matvec=lambda vector: factors.solve(vector.ravel(), trans="T"),
         rmatvec=lambda vector: factors.solve(vector.ravel()),
         dtype=np.float64,
     )
+    alternating = (-1.0) ** np.arange(n) * (1.0 + np.arange(n) / max(n - 1, 1))
     with np.errstate(all="ignore"):
-        largest = float(abs(scaled).sum(axis=0).max()) * float(onenormest(inverse, t=1))
+        second = 2.0 * float(np.abs(factors.solve(alternating, trans="T")).sum()) / (3.0 * n)
+        largest = float(abs(scaled).sum(axis=0).max()) * max(float(onenormest(inverse, t=1)), second)
     return 1.0 / largest if np.isfinite(largest) and largest > 0.0 else 0.0
