@@ -35,6 +35,7 @@ from halfdof_ctrl.plots import (
     transmissibility_plot,
 )
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.port_hamiltonian import PortHamiltonian, port_hamiltonian
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.modal.modal_damping import with_modal_damping
 from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
@@ -44,6 +45,7 @@ from halfdof_ctrl.sweeps.sweep import sweep
 from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.systems.descriptor_systems import dss2ss
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+from halfdof_ctrl.systems.state_map import StateMap, state_map
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness, transmissibility
 
@@ -63,11 +65,13 @@ __all__ = [
     "MaxwellDampedModel",
     "NonlinearModel",
     "PencilStructure",
+    "PortHamiltonian",
     "PronyFit",
     "Rigid",
     "SecondOrderModel",
     "Spring",
     "StateFeedback",
+    "StateMap",
     "SweepFailure",
     "SweepResult",
     "TruncatedModel",
@@ -102,11 +106,13 @@ __all__ = [
     "pencil_structure",
     "point_mass",
     "pole_map_plot",
+    "port_hamiltonian",
     "prony_plot",
     "rigid_body",
     "save_model",
     "save_response",
     "save_system",
+    "state_map",
     "step_plot",
     "sweep",
     "sweep_plot",

@@ -33,6 +33,7 @@ from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.report import check_as_json, default_design, write_report
 from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
@@ -46,6 +47,7 @@ from halfdof_ctrl.systems.frequency import (
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.working_states import working_system
 
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
 _Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
@@ -95,6 +97,10 @@ def run_info(arguments: argparse.Namespace) -> int:
         kind = "regular" if structure.is_regular else "SINGULAR"
         finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
         print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
+        form = energy_system(model)
+        if form is not None and form.n_rigid:
+            zeros = int(np.count_nonzero(np.linalg.eigvals(form.A) == 0.0))
+            print(f"Free motions: {form.n_rigid}, {zeros} poles at exactly 0, so that some static response is infinite")
     try:
         print(exact_reduction(model))
     except HalfdofError as refusal:
@@ -105,7 +111,7 @@ def run_info(arguments: argparse.Namespace) -> int:
 def run_ss(arguments: argparse.Namespace) -> int:
     """Write or print the state space."""
     _require_ending(arguments.o, MATRIX_ENDINGS)
-    system = mech2ss(_model(arguments))
+    system = mech2ss(_model(arguments), states=arguments.states)
     if arguments.o is None:
         print(system)
     else:
@@ -150,7 +156,7 @@ def run_step(arguments: argparse.Namespace) -> int:
     model = given
     if kind in TABLE_ENDINGS:
         recovered = _with_recovered(model)
-        system = mech2ss(recovered)
+        system = working_system(recovered)
         times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
         save_response(control.step_response(system, times, squeeze=False), arguments.o)
     else:
@@ -162,7 +168,7 @@ def run_poles(arguments: argparse.Namespace) -> int:
     """Print the eigenvalues of both forms, or draw them."""
     _require_ending(arguments.o, FIGURE_ENDINGS)
     model = _model(arguments)
-    table = eigenvalue_table(model, mech2ss(model))
+    table = eigenvalue_table(model, working_system(model))
     if arguments.o is not None:
         save_figure(pole_map_plot(model, title=model.name), arguments.o)
     print(table)
