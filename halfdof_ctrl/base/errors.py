@@ -203,6 +203,10 @@ class LostDigitsWarning(UserWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
+class InaccurateGainWarning(UserWarning):
+    """A gain is optimal to fewer digits than usual, since rounding of the problem moves it."""
+
+
 class FailedCasesWarning(UserWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
