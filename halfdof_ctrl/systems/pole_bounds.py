@@ -64,7 +64,7 @@ def bounded_poles(A: FloatArray) -> BoundedPoles:
     if A.size == 0:
         return BoundedPoles(np.zeros(0, dtype=np.complex128), np.zeros(0))
     matrix = balanced_states(np.asarray(A, dtype=float))[0]
-    triple = scipy.linalg.eig(matrix, left=True, right=True)  # type: ignore[misc]  # stubs lack this case
+    triple = scipy.linalg.eig(matrix, left=True, right=True)
     values, left, right = (np.asarray(part, dtype=np.complex128) for part in triple)
     values, bounds = _with_bounds(matrix, values, left, right)
     at_origin = np.abs(values) <= bounds
