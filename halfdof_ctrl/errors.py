@@ -3,6 +3,7 @@
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
+    EnergyFormError,
     FailedCasesWarning,
     FileFormatError,
     HalfdofError,
@@ -31,6 +32,7 @@ from halfdof_ctrl.base.errors import (
 __all__ = [
     "CloseDecisionWarning",
     "ComplexModelError",
+    "EnergyFormError",
     "FailedCasesWarning",
     "FileFormatError",
     "HalfdofError",

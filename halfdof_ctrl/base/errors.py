@@ -138,6 +138,15 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class EnergyFormError(HalfdofError):
+    """A model has no energy coordinates; `reason` is one word for why, `dofs` are concerned."""
+
+    def __init__(self, message: str, *, reason: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.dofs = dofs
+
+
 class ModelSizeError(HalfdofError):
     """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
 
