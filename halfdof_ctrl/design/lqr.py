@@ -25,10 +25,10 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, callers_level
 from halfdof_ctrl.base.names import force_names, listed, motion_names
-from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
-from halfdof_ctrl.design.plant import Plant, plant_of
+from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
+from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
 from halfdof_ctrl.design.reach import axis_eigenvalues, hidden_mode
-from halfdof_ctrl.design.riccati import CareProblem, Solver, solved_care
+from halfdof_ctrl.design.riccati import Solver, solved_care
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -40,6 +40,9 @@ from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 UNSEEN = 1e-8  #: imaginary parts, or displacements beside velocities, below this part are not shown
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
 MARGIN = 4.0  #: times its bound: a closed-loop pole nearer to the axis is not told from one on it
+GOOD = 1e-9  #: estimated error with which no other states are tried
+MANY = 24  #: states from which on energy coordinates are tried first: these are structures, whose DOFs lose digits
+WORTH = 0.1  #: of the estimated error: other states that leave more are not worth their way back to DOFs
 WARNED, REFUSED = 1e-8, 1e-6  #: estimated errors of a gain that are said, and that are too much
 
 
@@ -196,11 +199,12 @@ def lqr(
         if effort is not None or energy is not None or any(weights is not None for weights in physical.values()):
             msg = "Give either the matrices Q, R, N or physical weights, not both."
             raise WeightError(msg, names=("Q", "R", "N"))
-        cost = given_cost(Q, R, N, reduction)
+        weights, cost = None, given_cost(Q, R, N, reduction)
     else:
-        cost = physical_cost(reduction, list(physical.values()), effort, energy)
+        weights = checked_weights(model, list(physical.values()), energy)
+        cost = physical_cost(reduction, weights, effort)
     plant = mech2ss(reduction)
-    solved = _solved(reduction, cost, method)
+    solved = _solved(reduction, cost, weights, method)
     gain, A, B = solved.K, reduction.A, reduction.B
     closed = labelled_system(
         A - B @ gain,
@@ -224,42 +228,66 @@ def lqr(
     )
 
 
-def _solved(reduction: ExactReduction, cost: Cost, method: Solver) -> _Solved:
+def _solved(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | None, method: Solver) -> _Solved:
     """Solve the Riccati equation, and accept the gain only if it stabilizes and is known well enough."""
-    plant = plant_of(reduction)
-    _require_stabilizing_solution(reduction, plant, cost)
-    found = solved_care(CareProblem(plant.A, plant.B, cost.Q, cost.R, cost.N), method)
-    if found is None:
-        raise _unsolved_error(_eigenvalues(plant.A))
-    poles = bounded_poles(plant.A - plant.B @ found.K)
-    doubtful = poles.values.real >= -MARGIN * poles.bounds
-    if doubtful.any():
-        raise _unsolved_error(poles.values, float(poles.bounds[np.argmax(poles.values.real)]))
-    if not found.error <= REFUSED:
-        raise _inaccurate_error(found.error, poles.values)
-    if found.error > WARNED:
+    refusal: StabilizationError | None = None
+    best: _Solved | None = None
+    proposals = [lambda: plant_of(reduction, cost), lambda: plant_in_energy_states(reduction, cost, weights)]
+    if reduction.order > MANY:
+        proposals.reverse()
+    for propose in proposals:
+        plant = propose()
+        if plant is None:
+            continue
+        try:
+            found = _solved_in(plant, reduction, method)
+        except StabilizationError as error:
+            refusal = error
+            continue
+        if best is None or found.error < WORTH * best.error:
+            best = found
+        if best.error <= GOOD:
+            break
+    if best is None:
+        raise refusal if refusal is not None else _unsolved_error(_eigenvalues(reduction.A))
+    if best.error > WARNED:
         msg = (
-            f"The gain is known to {found.error:.1e} of its size only: that is what rounding of the entries of A, B, Q "
+            f"The gain is known to {best.error:.1e} of its size only: that is what rounding of the entries of A, B, Q "
             "and R does to it. The closed loop is stable; weights nearer to each other give a gain with more digits."
         )
         warnings.warn(msg, InaccurateGainWarning, stacklevel=callers_level())
-    return _Solved(found.K + 0.0, found.X, found.error, poles.values)
+    return best
 
 
-def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant, cost: Cost) -> None:
+def _solved_in(plant: Plant, reduction: ExactReduction, method: Solver) -> _Solved:
+    """Solve in the states of a plant, and go back to those of the reduction."""
+    _require_stabilizing_solution(reduction, plant)
+    found = solved_care(plant.problem, method, balance=plant.T is None)
+    if found is None:
+        raise _unsolved_error(_eigenvalues(plant.A))
+    poles = bounded_poles(plant.A - plant.B @ found.K)
+    if (poles.values.real >= -MARGIN * poles.bounds).any():
+        raise _unsolved_error(poles.values, float(poles.bounds[np.argmax(poles.values.real)]))
+    if not found.error <= REFUSED:
+        raise _inaccurate_error(found.error, poles.values)
+    K, S = (found.K, found.X) if plant.T is None else (found.K @ plant.T, plant.T.T @ found.X @ plant.T)
+    return _Solved(K + 0.0, S, found.error, poles.values)
+
+
+def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant) -> None:
     """Refuse a mode that no feedback stabilizes or that the optimal one would leave on the axis.
 
     A stabilizing solution of the Riccati equation exists if and only if every mode that is not stable is
     reached by the inputs and no mode on the imaginary axis is hidden from the cost (K. Zhou, J. C. Doyle and
     K. Glover, Robust and Optimal Control, theorem 13.7).
     """
-    A, B = plant.A, plant.B
+    A, B, cost = plant.A, plant.B, plant.cost
     cross = np.linalg.solve(cost.R, cost.N.T)
     for eigenvalue in axis_eigenvalues(A, right_too=True):
         hidden = hidden_mode(A.T, B.T, eigenvalue)
         if hidden is not None:
             mode, part = hidden
-            force = _best_force(reduction, mode)
+            force = _best_force(reduction, mode if plant.T is None else plant.T.T @ mode)
             msg = (
                 f"The mode at {_in_words(eigenvalue)} rad/s is not stable and the inputs reach it by {part:.0e} of a "
                 "usual mode, which is not told from nothing, so that no feedback "
@@ -271,7 +299,7 @@ def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant, cost:
         hidden = hidden_mode(folded, cost.Q - cost.N @ cross, eigenvalue)
         if hidden is not None:
             mode, part = hidden
-            kind, dof = _largest_motion(reduction, mode)
+            kind, dof = _largest_motion(reduction, mode if plant.T_inverse is None else plant.T_inverse @ mode)
             msg = (
                 f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost sees it by {part:.0e} of a usual "
                 "mode, which is not told from nothing, so that the "

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from halfdof_ctrl import hydromount, lqr, mechss
+from halfdof_ctrl import SecondOrderModel, hydromount, lqr, mechss
 from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError
 from halfdof_ctrl.design.riccati import CareProblem, Solver, solved_care
 
@@ -115,3 +115,30 @@ def test_exactly_hidden_modes_stay_refused() -> None:
     """Two equal oscillators under one force swing against each other, whatever the feedback does."""
     with pytest.raises(StabilizationError, match=r"the inputs reach it by .* not told from nothing"):
         _nearly_unreached(0.0)
+
+
+def cantilever(elements: int) -> SecondOrderModel:
+    """Give a cantilever of unit length, mass and bending stiffness by Hermitian elements, driven at its tip."""
+    h = 1.0 / elements
+    k = np.array([[12, 6, -12, 6], [6, 4, -6, 2], [-12, -6, 12, -6], [6, 2, -6, 4]]) / h**3
+    m = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420
+    turn = np.array([1.0, h, 1.0, h])
+    M, K = np.zeros((2, 2 * elements + 2, 2 * elements + 2))
+    for first in range(0, 2 * elements, 2):
+        span = slice(first, first + 4)
+        K[span, span] += k * turn * turn[:, None]
+        M[span, span] += m * turn * turn[:, None]
+    M, K = M[2:, 2:], K[2:, 2:]
+    return mechss(M, 0.2 * M, K).select(f"F_q{2 * elements - 2}", f"q{2 * elements - 2}")
+
+
+def test_gain_of_a_beam_does_not_depend_on_the_states_it_was_found_in() -> None:
+    """At 10 elements states of DOFs still work; at 20 the slowest closed-loop pole is that of 10, discretization apart."""
+    slowest = []
+    for elements in (10, 20):
+        model = cantilever(elements)
+        feedback = lqr(model, displacement={model.outputs[0]: 1.0}, effort={model.inputs[0]: 1.0})
+        slowest.append(feedback.poles[np.abs(feedback.poles).argmin()])
+        assert feedback.gain_error < BETWEEN
+    assert_allclose(slowest[0].real, slowest[1].real, rtol=1e-6)
+    assert_allclose(slowest[0].imag, slowest[1].imag, rtol=1e-5)
