@@ -232,11 +232,9 @@ def _solved(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | No
     """Solve the Riccati equation, and accept the gain only if it stabilizes and is known well enough."""
     refusal: StabilizationError | None = None
     best: _Solved | None = None
-    proposals = [lambda: plant_of(reduction, cost), lambda: plant_in_energy_states(reduction, cost, weights)]
-    if reduction.order > MANY:
-        proposals.reverse()
-    for propose in proposals:
-        plant = propose()
+    in_energy = (True, False) if reduction.order > MANY else (False, True)
+    for energy in in_energy:
+        plant = plant_in_energy_states(reduction, cost, weights) if energy else plant_of(reduction, cost)
         if plant is None:
             continue
         try:

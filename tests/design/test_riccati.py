@@ -133,12 +133,12 @@ def cantilever(elements: int) -> SecondOrderModel:
 
 
 def test_gain_of_a_beam_does_not_depend_on_the_states_it_was_found_in() -> None:
-    """At 10 elements states of DOFs still work; at 20 the slowest closed-loop pole is that of 10, discretization apart."""
+    """At 20 elements, where states of DOFs lose it, the slowest pole is that of 10, discretization apart."""
     slowest = []
     for elements in (10, 20):
         model = cantilever(elements)
         feedback = lqr(model, displacement={model.outputs[0]: 1.0}, effort={model.inputs[0]: 1.0})
         slowest.append(feedback.poles[np.abs(feedback.poles).argmin()])
         assert feedback.gain_error < BETWEEN
-    assert_allclose(slowest[0].real, slowest[1].real, rtol=1e-6)
+    assert_allclose(slowest[0].real, slowest[1].real, rtol=1e-5)
     assert_allclose(slowest[0].imag, slowest[1].imag, rtol=1e-5)
