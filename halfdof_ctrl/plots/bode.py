@@ -32,10 +32,16 @@ from halfdof_ctrl.plots.axes import (
     no_lines,
     prepared_axes,
     require_system,
+    usual_largest,
 )
 from halfdof_ctrl.plots.phase import continuous_phase, on_branch
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
-from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response, has_many_states
+from halfdof_ctrl.systems.frequency import (
+    descriptor_response,
+    frequency_response,
+    has_many_states,
+    system_frequencies,
+)
 from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
@@ -43,7 +49,7 @@ PEAK_MARKS = 6  #: markers on the highest peaks besides
 CLOSE = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
-USUAL = 95.0  #: [%] of the points of a curve lie in the range that is shown in any case
+USUAL = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
 FLAT = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
 ROOM = 5.0  #: ... and gets this factor above and below
 SPIKE = 1e5  #: a peak higher than this times that range is cut
@@ -194,6 +200,8 @@ def _curve(
             reference = sysdata
     else:
         sys = sysdata
+    if omega is None:
+        omega = system_frequencies(sys, sysdata if isinstance(sysdata, SecondOrderModel) else None)
     curve = frequency_response(sys, omega)
     if reference is not None:
         size = (curve.noutputs, curve.ninputs)
@@ -266,7 +274,7 @@ def _set_logarithmic(ax: Axes) -> None:
     if curve.max() <= FLAT * curve.min():
         ax.set_ylim(curve.min() / ROOM, curve.max() * ROOM)
     ax.set_yscale("log")
-    usual = float(np.percentile(curve, USUAL))
+    usual = usual_largest(ax, USUAL)
     if ax.dataLim.y1 > SPIKE * usual:
         ax.set_ylim(top=np.sqrt(SPIKE) * usual)
 

@@ -26,6 +26,7 @@ from halfdof_ctrl.plots.axes import (
 from halfdof_ctrl.plots.units import Units, known_units, plain, signal_label, signal_names, typeset
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.model_poles import model_poles
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 
@@ -134,7 +135,8 @@ def _times(
     if reduction is not None:
         motion = reduction.displacement
         C, D = np.vstack([C, motion.X]), np.vstack([D, motion.direct(sys.ninputs)])
-    return step_times(relevant_poles(sys.A, sys.B, C, D), horizon)
+    poles = None if reduction is None else model_poles(reduction.model, sys.A)
+    return step_times(relevant_poles(sys.A, sys.B, C, D, poles), horizon)
 
 
 def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:

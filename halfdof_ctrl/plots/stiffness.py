@@ -13,7 +13,16 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_grid, finished_plot, label_y, no_lines, prepared_axes
+from halfdof_ctrl.plots.axes import (
+    AxesArray,
+    AxesLike,
+    draw_grid,
+    finished_plot,
+    label_y,
+    no_lines,
+    prepared_axes,
+    usual_largest,
+)
 from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
 from halfdof_ctrl.systems.stiffness import (
@@ -30,7 +39,7 @@ Labels: TypeAlias = str | Sequence[str] | None
 SCALES: tuple[Scale, ...] = get_args(Scale)
 ANGLE_STEPS = {True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0), False: (1.0, 2.0, 5.0, 10.0)}  #: of ticks, by WIDE or not
 WIDE = 60.0  #: [deg] range of angles with ticks at parts of a right angle
-USUAL = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
+USUAL = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
 SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
 ROOM = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
 FLAT = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
@@ -161,7 +170,8 @@ def transmissibility_plot(
     models, texts = _models(sysdata, label)
     _require_scales(xscale, yscale)
     if omega is None:
-        omega = motion_frequencies(models, from_ if kind == "motion" else to, linear=xscale == "linear")
+        held, other = (from_, to) if kind == "motion" else (to, from_)
+        omega = motion_frequencies(models, held, other=other, linear=xscale == "linear")
     responses = [transmissibility_response(model, from_, to, omega, kind=kind) for model in models]
     causes, results = as_tuple(from_), as_tuple(to)
     unit = _ratio_unit(models[0], units, results, causes)
@@ -267,7 +277,7 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = float(np.percentile(curve, USUAL))
+    usual = usual_largest(ax, USUAL)
     if curve.max() - curve.min() <= FLAT * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
     elif curve.max() > SPIKE[scale] * usual:
