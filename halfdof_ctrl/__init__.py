@@ -1,9 +1,9 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
-from halfdof_ctrl.base.errors import HalfdofError
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files.models import inspect_files, load_model, save_model
 from halfdof_ctrl.files.systems import load_system, save_system
 from halfdof_ctrl.files.tables import save_response
@@ -19,6 +19,7 @@ from halfdof_ctrl.plots import (
     transmissibility_plot,
 )
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.port_hamiltonian import PortHamiltonian, port_hamiltonian
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
 from halfdof_ctrl.report import write_report
@@ -26,6 +27,7 @@ from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
 from halfdof_ctrl.sweeps.sweep import sweep
 from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+from halfdof_ctrl.systems.state_map import StateMap, state_map
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness, transmissibility
 
@@ -36,8 +38,10 @@ __all__ = [
     "ExactReduction",
     "HalfdofError",
     "PencilStructure",
+    "PortHamiltonian",
     "SecondOrderModel",
     "StateFeedback",
+    "StateMap",
     "SweepFailure",
     "SweepResult",
     "TruncatedModel",
@@ -57,9 +61,11 @@ __all__ = [
     "mechss",
     "pencil_structure",
     "pole_map_plot",
+    "port_hamiltonian",
     "save_model",
     "save_response",
     "save_system",
+    "state_map",
     "step_plot",
     "sweep",
     "sweep_plot",
@@ -69,3 +75,8 @@ __all__ = [
     "write_report",
     "zeros",
 ]
+
+
+def __dir__() -> list[str]:
+    """Show the public names alone; the rooms of the package can still be imported."""
+    return [*__all__, "__version__", "errors"]

@@ -29,7 +29,7 @@ from halfdof_ctrl.commands import (
     run_step,
     run_stiffness,
 )
-from halfdof_ctrl.report import without_windows
+from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
 
 PROGRAM = "halfdof-ctrl"

@@ -24,10 +24,11 @@ from halfdof_ctrl.files.writing import replacing
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
 from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.report import check_as_json, default_design, save_figure, write_report
+from halfdof_ctrl.report import check_as_json, default_design, write_report
 from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
 from halfdof_ctrl.systems.frequency import (
@@ -40,6 +41,7 @@ from halfdof_ctrl.systems.frequency import (
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.working_states import working_system
 
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
 _Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
@@ -134,7 +136,7 @@ def run_step(arguments: argparse.Namespace) -> int:
     model = _model(arguments)
     if kind in TABLE_ENDINGS:
         recovered = _with_recovered(model)
-        system = mech2ss(recovered)
+        system = working_system(recovered)
         times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
         save_response(control.step_response(system, times, squeeze=False), arguments.o)
     else:
@@ -146,7 +148,7 @@ def run_poles(arguments: argparse.Namespace) -> int:
     """Print the eigenvalues of both forms, or draw them."""
     _require_ending(arguments.o, FIGURE_ENDINGS)
     model = _model(arguments)
-    table = eigenvalue_table(model, mech2ss(model))
+    table = eigenvalue_table(model, working_system(model))
     if arguments.o is not None:
         save_figure(pole_map_plot(model, title=model.name), arguments.o)
     print(table)

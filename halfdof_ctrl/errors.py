@@ -1,4 +1,4 @@
-"""The exceptions and warnings of the package."""
+"""The exceptions and warnings of the package: the public path of what `base.errors` defines."""
 
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
@@ -57,3 +57,6 @@ __all__ = [
     "WeightError",
     "WorkerError",
 ]
+
+for _name in __all__:
+    globals()[_name].__module__ = __name__  # tracebacks, warning filters, pickles and the documentation name this path

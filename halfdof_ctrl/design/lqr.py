@@ -25,6 +25,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, callers_level
 from halfdof_ctrl.base.names import force_names, listed, motion_names
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
 from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
 from halfdof_ctrl.design.reach import axis_eigenvalues, hidden_mode
@@ -113,7 +114,7 @@ class StateFeedback:
         lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
-        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
         return "\n".join([*lines, f"  closed-loop poles: {poles}"])
 
 
@@ -287,7 +288,8 @@ def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant) -> No
             mode, part = hidden
             force = _best_force(reduction, mode if plant.T is None else plant.T.T @ mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and the inputs reach it by {part:.0e} of a "
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is not stable and the inputs reach it by "
+                f"{part:.0e} of a "
                 "usual mode, which is not told from nothing, so that no feedback "
                 f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
             )
@@ -299,7 +301,8 @@ def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant) -> No
             mode, part = hidden
             kind, dof = _largest_motion(reduction, mode if plant.T_inverse is None else plant.T_inverse @ mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost sees it by {part:.0e} of a usual "
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is undamped and the cost sees it by "
+                f"{part:.0e} of a usual "
                 "mode, which is not told from nothing, so that the "
                 f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
             )
@@ -314,7 +317,8 @@ def _unsolved_error(poles: ComplexArray, bound: float | None = None) -> Stabiliz
     known = "" if bound is None else f", known to {bound:.0e} rad/s"
     msg = (
         "The solver found no stabilizing gain, although nothing hides a mode from inputs and cost: a pole stays at "
-        f"{_in_words(worst)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; or the weights "
+        f"{complex_in_words(worst, pair=True)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; or "
+        "the weights "
         "differ by too many powers of ten: bring Q and R closer together, or place an actuator where the mode moves."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
@@ -326,7 +330,8 @@ def _inaccurate_error(error: float, poles: ComplexArray) -> StabilizationError:
     msg = (
         f"The gain that was found stabilizes, but it is known to {error:.0e} of its size only, where {REFUSED:.0e} is "
         "needed to call it optimal: rounding of the entries of A, B, Q and R moves it so far. The slowest pole with it "
-        f"is {_in_words(slowest)} rad/s. An input that hardly reaches a mode, or weights that differ by many powers of "
+        f"is {complex_in_words(slowest, pair=True)} rad/s. An input that hardly reaches a mode, or weights that differ by many "
+        "powers of "
         "ten, do this: bring the weights closer together, or actuate the mode."
     )
     return StabilizationError(msg, eigenvalue=slowest, quantity="Q, R")
@@ -348,10 +353,3 @@ def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str,
 
 def _eigenvalues(A: FloatArray) -> ComplexArray:
     return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
-
-
-def _in_words(value: complex) -> str:
-    """Write a pole with four digits, a pair as one."""
-    if abs(value.imag) <= UNSEEN * abs(value):
-        return f"{value.real:.4g}"
-    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"

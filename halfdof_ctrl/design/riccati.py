@@ -25,7 +25,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dtrsyl
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.exact_products import Double2, added, matrix_product, two_sum
+from halfdof_ctrl.base.double_double import Double2, added, matrix_product, two_sum
 from halfdof_ctrl.base.spectrum import balanced_states
 
 Solver = Literal["scipy", "slycot"]

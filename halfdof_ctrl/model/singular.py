@@ -159,7 +159,7 @@ def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
 
 
 def _is_constant(columns: Matrix) -> bool:
-    """Return whether columns of K, C and M on top of each other are dependent, so that a null vector holds at every s."""
+    """Tell whether columns of K, C and M on top of each other are dependent, so that a null vector holds at every s."""
     values = scipy.linalg.svdvals(_scaled(columns))
     return bool(values[-1] <= NULL * max(columns.shape) * values[0])
 

@@ -21,7 +21,7 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_tw
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.spectrum import ROUNDING
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.base.words import in_words
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.first_order import typical_frequency
 from halfdof_ctrl.descriptor.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.descriptor.regularity import require_regular
@@ -206,7 +206,7 @@ def _compare_transfer(
     by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
-    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {in_words(points[k])}"
+    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {complex_in_words(points[k])}"
     with np.errstate(divide="ignore", invalid="ignore"):
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
     evaluated = np.asarray(sys(points, squeeze=False, warn_infinite=False))
@@ -220,7 +220,7 @@ def _compare_transfer(
 def _compare_steps(
     model: SecondOrderModel, system: BalancedSystem, moving: ComplexArray, unclear: FloatArray, index: int
 ) -> tuple[float, str, float]:
-    """Follow the response to a step of each input by both roads, segment by segment."""
+    """Follow the response to a step of each input by both routes, segment by segment."""
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         return 0.0, "not followed: a step has no derivative for Bv, Ba, Dv, Da", 0.0
     plan = step_plan(moving)

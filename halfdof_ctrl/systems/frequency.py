@@ -30,11 +30,12 @@ from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric,
 from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visible_zeros
 from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.systems.model_poles import model_poles
+from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.working_states import response_of_form, working_form
 
 NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
@@ -124,7 +125,8 @@ def frequency_response(
     Notes
     -----
     The states are balanced by powers of two and all points are worked side by side on a Hessenberg
-    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`.
+    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`. A model is worked in
+    energy coordinates where it has them, whatever states `mech2ss` gives.
 
     Examples
     --------
@@ -140,14 +142,17 @@ def frequency_response(
             sys = mech2ss(sysdata)
         except NO_STATE_SPACE:
             return descriptor_response(sysdata, omega)
+        form = working_form(sysdata, sys.nstates)
     else:
-        sys = sysdata
-    frequencies = checked_frequencies(system_frequencies(sys, model) if omega is None else omega)
+        sys, form = sysdata, None
+    if omega is None:
+        omega = system_frequencies(sys if form is None else energy_state_space(form), model)
+    frequencies = checked_frequencies(omega)
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    values = state_space_response(A, B, C, D, points)
+    values = state_space_response(A, B, C, D, points) if form is None else response_of_form(form, (A, B, C, D), points)
     return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
 
 
@@ -202,7 +207,7 @@ def system_modes(
 ) -> tuple[SeenModes, ComplexArray]:
     """Find which poles of a continuous state space and a polynomial part are seen, and the zeros of its channels."""
     A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    poles = bounded_poles(A) if model is None else model_poles(model, A)
+    poles = bounded_poles(A) if model is None else poles_of_model(model, A)
     if len(A) > MOST_CIRCLED:
         every = np.ones(poles.values.size, dtype=bool)
         return SeenModes(poles.values, poles.bounds, every, every), np.zeros(0, dtype=np.complex128)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.exact_products import added, matrix_product, two_product
+from halfdof_ctrl.base.double_double import added, matrix_product, two_product
 from halfdof_ctrl.base.spectrum import balanced_states
 
 UNIT = float(np.finfo(float).eps) / 2.0

@@ -5,7 +5,7 @@ import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import ROUNDING, eigenvalues_and_rounding
-from halfdof_ctrl.base.words import in_words
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -36,7 +36,7 @@ def compare_poles(model: SecondOrderModel, A: FloatArray, finite: ComplexArray, 
         excess = _excess(model, finite[place], poles[place], gamma)
         errors[place] = min(errors[place], excess * POLE_TOLERANCE)
     worst = int(np.argmax(errors))
-    return float(errors[worst]), f"pole {in_words(poles[worst])}"
+    return float(errors[worst]), f"pole {complex_in_words(poles[worst])}"
 
 
 def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: float) -> float:

@@ -45,7 +45,7 @@ class SeenModes:
     @property
     def moving(self) -> ComplexArray:
         """Poles that a frequency response shows, without those at the origin."""
-        return self.poles[self.in_frequency & (self.poles != 0.0)]
+        return np.asarray(self.poles[self.in_frequency & (self.poles != 0.0)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -153,7 +153,7 @@ def _principal_part(values: ComplexArray, cluster: _Cluster, turn: ComplexArray)
     for k in range(1, min(cluster.places.size, MOST_TERMS) + 1):
         mean = (values * turn**k).mean(axis=2)
         terms.append(np.where(np.abs(mean) > ROUNDING * largest, mean * cluster.radius**k, 0.0))
-    return np.nan_to_num(np.array(terms))
+    return np.asarray(np.nan_to_num(np.array(terms)))
 
 
 def _is_visible(principal: ComplexArray, cluster: _Cluster, top: complex, value: ComplexArray, *, real: bool) -> bool:

@@ -259,8 +259,8 @@ def _moved_response(model: SecondOrderModel, held: Names, shown: Names, points: 
     """Return motions per motion of some DOFs, (p, 1, k), or with nothing to be shown their dynamic stiffness."""
     values = _driven_response(model, held, points, shown=shown)
     if shown is None:
-        return values.sum(axis=(0, 1), keepdims=True)
-    return values[: len(as_tuple(shown))].sum(axis=1, keepdims=True)
+        return np.asarray(values.sum(axis=(0, 1), keepdims=True))
+    return np.asarray(values[: len(as_tuple(shown))].sum(axis=1, keepdims=True))
 
 
 def _receptance(model: SecondOrderModel, push: FloatArray, points: ComplexArray) -> ComplexArray:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, FloatArray, IndexArray, read_only
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, FloatArray, IndexArray, is_zero, read_only
 from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -46,10 +46,17 @@ class EnergyForm:
     dofs: tuple[str, ...]  #: names of the states of which `T` transforms: q_i, q_c, q'_i
     T: FloatArray  #: (N, N) x = T x_dofs; a gain on DOF states is K_dofs = K T
     T_inverse: FloatArray  #: (N, N) x_dofs = T_inverse x; weights are Q = T_inverse^T Q_dofs T_inverse
-    n_rigid: int  #: number of free motions, whose displacements and momenta are the first states
+    n_rigid: int  #: number of free motions, whose displacements are the first states
+    n_massive: int  #: number of them with mass, whose momenta come next
+    n_strains: int  #: number of strains, which follow; the rest are momenta
     nearest: (
         float  #: energy over rounding, ratio (22) over eps, of the softest motion that is not free; inf if not near
     )
+
+    @property
+    def output(self) -> Signal:
+        """The model's outputs as functions of state, inputs and derivatives of inputs."""
+        return motion_output(self.model, self.A, self.B, self.displacement, self.velocity)
 
 
 def energy_form(model: SecondOrderModel) -> EnergyForm:
@@ -176,6 +183,8 @@ class _Assembly:
             T=read_only(np.hstack([from_q[:, position], from_v[:, inertial]])),
             T_inverse=read_only(from_states),
             n_rigid=self.free.count,
+            n_massive=self.free.massive,
+            n_strains=self.L.shape[1],
             nearest=self.nearest,
         )
 
@@ -296,6 +305,17 @@ class _Assembly:
         else:
             momenta = [f"momentum{k + 1}" for k in range(free.complement.shape[1])]
         return (*rigid, *rates, *strains, *momenta)
+
+
+def motion_output(model: SecondOrderModel, A: FloatArray, B: FloatArray, q: Signal, v: Signal) -> Signal:
+    """Return the model's outputs from displacements and velocities that are known as functions of the state."""
+    output = Signal(np.zeros((len(model.outputs), len(A))), trimmed((model.D, model.Dv, model.Da)))
+    for matrix, motion in ((model.F, q), (model.G, v)):
+        if not is_zero(matrix):
+            output = output.plus(motion.combined(matrix))
+    if not is_zero(model.H):
+        output = output.plus(v.combined(model.H).derivative(A, B))
+    return output
 
 
 def _shifted(X: FloatArray, U: list[FloatArray], shift: tuple[FloatArray, ...]) -> Signal:
