@@ -34,14 +34,14 @@ from halfdof_ctrl.plots.axes import (
     require_system,
     usual_largest,
 )
-from halfdof_ctrl.plots.phase import continuous_phase, on_branch
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
 from halfdof_ctrl.systems.frequency import (
     descriptor_response,
     frequency_response,
     has_many_states,
-    system_frequencies,
 )
+from halfdof_ctrl.systems.phase import response_phase
+from halfdof_ctrl.systems.sampled_phase import on_branch
 from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
@@ -145,8 +145,8 @@ def bode_plot(
 
     Notes
     -----
-    The phase starts between -180 and 180 degrees and has no jumps; across an undamped pole it falls and
-    across an undamped zero it rises, as with vanishing damping.
+    The phase is on the branch that poles and zeros of the model give, on any grid: across an undamped pole it falls
+    and across an undamped zero it rises, as with vanishing damping. See `systems.phase`.
 
     Examples
     --------
@@ -161,7 +161,7 @@ def bode_plot(
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     lines, scales, prefix = no_lines(axes), Scales(dB, Hz, deg), legend_prefix(label)
-    values, marks = np.asarray(curve.frdata), _marked(curve)
+    values, marks, phases = np.asarray(curve.frdata), _marked(curve), response_phase(curve)
     exact = (
         None
         if reference is None or marks.size == 0
@@ -169,7 +169,7 @@ def bode_plot(
     )
     for i, j in product(range(p), range(m)):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
-        phase = continuous_phase(values[i, j])
+        phase = phases[i, j]
         x = scales.frequency(curve.omega)
         style: dict[str, Any] = {"label": prefix + kind, "linewidth": 1.5}
         lines[2 * i, j] += above.plot(x, scales.magnitude(values[i, j]), **style)

@@ -23,8 +23,8 @@ from halfdof_ctrl.plots.axes import (
     prepared_axes,
     usual_largest,
 )
-from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
+from halfdof_ctrl.systems.phase import response_phase
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
     dynamic_stiffness_response,
@@ -236,7 +236,7 @@ def _draw(
         omega, values = np.asarray(response.omega, dtype=float), np.asarray(response.frdata)[0, 0]
         x = omega / (2.0 * np.pi) if Hz else omega
         lines[0, 0] += axes[0, 0].plot(x, np.abs(values), label=text, linewidth=1.5)
-        lines[1, 0] += axes[1, 0].plot(x, np.degrees(continuous_phase(values)), label=text, linewidth=1.5)
+        lines[1, 0] += axes[1, 0].plot(x, np.degrees(response_phase(response)[0, 0]), label=text, linewidth=1.5)
     return lines
 
 

@@ -32,6 +32,7 @@ from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visib
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
+from halfdof_ctrl.systems.phase import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
@@ -96,7 +97,8 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
         values = model(1j * frequencies, squeeze=False)
     name = None if model.name is None else control_label(model.name)
-    return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
+    data = _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
+    return with_source(data, source_of(model))
 
 
 def frequency_response(
@@ -153,7 +155,8 @@ def frequency_response(
         points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
     values = state_space_response(A, B, C, D, points) if form is None else response_of_form(form, (A, B, C, D), points)
-    return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
+    data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
+    return with_source(data, source_of(sys if model is None else model) or source_of(sys))
 
 
 def has_many_states(model: SecondOrderModel) -> bool:
