@@ -317,9 +317,9 @@ def _unsolved_error(poles: ComplexArray, bound: float | None = None) -> Stabiliz
     known = "" if bound is None else f", known to {bound:.0e} rad/s"
     msg = (
         "The solver found no stabilizing gain, although nothing hides a mode from inputs and cost: a pole stays at "
-        f"{complex_in_words(worst, pair=True)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; or "
-        "the weights "
-        "differ by too many powers of ten: bring Q and R closer together, or place an actuator where the mode moves."
+        f"{complex_in_words(worst, pair=True)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; "
+        "or the weights differ by too many powers of ten: bring Q and R closer together, or place an actuator where "
+        "the mode moves."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
 
@@ -330,9 +330,8 @@ def _inaccurate_error(error: float, poles: ComplexArray) -> StabilizationError:
     msg = (
         f"The gain that was found stabilizes, but it is known to {error:.0e} of its size only, where {REFUSED:.0e} is "
         "needed to call it optimal: rounding of the entries of A, B, Q and R moves it so far. The slowest pole with it "
-        f"is {complex_in_words(slowest, pair=True)} rad/s. An input that hardly reaches a mode, or weights that differ by many "
-        "powers of "
-        "ten, do this: bring the weights closer together, or actuate the mode."
+        f"is {complex_in_words(slowest, pair=True)} rad/s. An input that hardly reaches a mode, or weights that differ "
+        "by many powers of ten, do this: bring the weights closer together, or actuate the mode."
     )
     return StabilizationError(msg, eigenvalue=slowest, quantity="Q, R")
 
