@@ -61,7 +61,7 @@ class SystemSource:
     def response(self, output: int, source: int, points: ComplexArray) -> ComplexArray:
         """Evaluate a channel."""
         part = (self.B[:, [source]], self.C[[output]], self.D[[output]][:, [source]])
-        return state_space_response(self.A, *part, points)[0, 0]
+        return np.asarray(state_space_response(self.A, *part, points)[0, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,7 +86,7 @@ class ModelSource:
     def response(self, output: int, source: int, points: ComplexArray) -> ComplexArray:
         """Evaluate a channel."""
         channel = self.model.select(self.model.inputs[source], self.model.outputs[output])
-        return np.asarray(channel(points, squeeze=False))[0, 0]
+        return np.asarray(channel(points, squeeze=False)[0, 0])
 
 
 Source = SystemSource | ModelSource

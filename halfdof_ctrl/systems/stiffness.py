@@ -11,13 +11,13 @@ g at rest r is minus the force that arrives at g: the transmissibility of force.
 import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
 from halfdof_ctrl.descriptor.regularity import require_regular
@@ -29,6 +29,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, checked_frequencies
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
+from halfdof_ctrl.systems.phase import Source, source_of, with_source
 from halfdof_ctrl.systems.seen_modes import Response, seen_poles
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
@@ -163,7 +164,8 @@ def dynamic_stiffness_response(
     frequencies = checked_frequencies(motion_frequencies([model], dof, free=True) if omega is None else omega)
     values = dynamic_stiffness(model, dof, 1j * frequencies)
     names = as_tuple(dof)
-    return _data(values, frequencies, names, reaction_names(names), model)
+    data = _data(values, frequencies, names, reaction_names(names), model)
+    return with_source(data, _stiffness_source(model, names))
 
 
 def transmissibility_response(
@@ -202,7 +204,30 @@ def transmissibility_response(
     causes, results = as_tuple(from_), as_tuple(to)
     if kind == "force":
         causes, results = force_names(causes), reaction_names(results)
-    return _data(values, frequencies, causes, results, model)
+    data = _data(values, frequencies, causes, results, model)
+    return with_source(data, _transmissibility_source(model, as_tuple(from_), as_tuple(to), kind))
+
+
+def _stiffness_source(model: SecondOrderModel, names: tuple[str, ...]) -> Source | None:
+    """Return the model whose transfer function the dynamic stiffness at a single DOF is."""
+    rest = _at_rest(model)
+    if len(names) > 1 or len(rest.dofs) == 1:
+        return None
+    return source_of(replace(rest, prescribed=()).prescribe_motion(names))
+
+
+def _transmissibility_source(
+    model: SecondOrderModel, from_: tuple[str, ...], to: tuple[str, ...], kind: TransmissibilityKind
+) -> Source | None:
+    """Return the model whose transfer function the transmissibility between two DOFs is."""
+    rest = replace(_at_rest(model), prescribed=())
+    if len(from_) > 1 or len(to) > 1 or len(rest.dofs) == 1 or from_ == to:
+        return None
+    if kind == "motion":
+        return source_of(rest.prescribe_motion(from_, outputs=list(to)))
+    moved = rest.prescribe_motion(to, inputs=list(force_names(from_)), outputs=list(reaction_names(to)))
+    signs: dict[str, Any] = {letter: read_only(-np.asarray(getattr(moved, letter))) for letter in ("F", "G", "H", "D", "Dv", "Da")}
+    return source_of(replace(moved, **signs))  # what arrives at the support is minus its reaction
 
 
 def motion_frequencies(

@@ -286,7 +286,7 @@ def _histories(inputs: Histories, names: tuple[str, ...], count: int) -> FloatAr
         if hasattr(cause, "names"):
             raise
         msg = f"inputs must be histories of {len(names)} inputs at {count} times, ({len(names)}, {count}): {cause}."
-        raise ParameterError(msg, parameter="inputs", value=np.shape(inputs)) from cause
+        raise ParameterError(msg, parameter="inputs", value=None) from cause
     if not np.isfinite(values).all():
         msg = "inputs must be finite numbers at all times."
         raise ParameterError(msg, parameter="inputs", value=None)
