@@ -226,7 +226,9 @@ def _transmissibility_source(
     if kind == "motion":
         return source_of(rest.prescribe_motion(from_, outputs=list(to)))
     moved = rest.prescribe_motion(to, inputs=list(force_names(from_)), outputs=list(reaction_names(to)))
-    signs: dict[str, Any] = {letter: read_only(-np.asarray(getattr(moved, letter))) for letter in ("F", "G", "H", "D", "Dv", "Da")}
+    signs: dict[str, Any] = {
+        letter: read_only(-np.asarray(getattr(moved, letter))) for letter in ("F", "G", "H", "D", "Dv", "Da")
+    }
     return source_of(replace(moved, **signs))  # what arrives at the support is minus its reaction
 
 
