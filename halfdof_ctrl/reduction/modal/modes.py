@@ -22,7 +22,8 @@ from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU
 from halfdof_ctrl.reduction.modal.slices import MOST, modes_by_slices
 
 FEW = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
-SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular
+SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular ...
+SOFTER = (1e-12, 1e-10, 1e-8, 1e-6, 1e-3)  #: ... or is not told from singular with that one either
 UNSYMMETRIC = 1e-9  #: relative difference between a matrix and its transpose that is no rounding
 MASSLESS = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
 
@@ -44,9 +45,14 @@ class ShiftedStiffness:
             return cls(K=K, M=M, sigma=0.0, factors=factors)
         stiffness, mass = np.abs(K.diagonal()), M.diagonal()
         speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
-        sigma = -SOFT * float(speeds[speeds > 0.0].min(initial=1.0))
-        factors = SparseLU.factorized(csc_array(K - sigma * M))
-        return None if factors.is_singular else cls(K=K, M=M, sigma=sigma, factors=factors)
+        speeds = speeds[speeds > 0.0]
+        slowest = float(speeds.min()) if speeds.size else 1.0
+        shifts = [-SOFT * min(slowest, 1.0), *[-part * slowest for part in SOFTER]]
+        for sigma in shifts:  # as little mass as makes it regular: much of it would hide the lowest modes from Lanczos
+            factors = SparseLU.factorized(csc_array(K - sigma * M))
+            if not factors.is_singular:
+                return cls(K=K, M=M, sigma=sigma, factors=factors)
+        return None
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""

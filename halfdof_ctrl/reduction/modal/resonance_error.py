@@ -76,7 +76,8 @@ def resonance_errors(
     size_of_K: Any = abs(parts["K"])
     for k in range(poles.size):
         w = shapes[:, k]
-        energy = float(np.abs(w @ (parts["K"] @ w)))
+        stiff: Any = parts["K"] @ w
+        energy = abs(complex(w @ stiff))
         floor.append(0.5 * UNIT * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
     return ResonanceErrors(
         frequencies=np.abs(poles) / (2.0 * np.pi),
@@ -135,7 +136,7 @@ def _improved(
     found, places = np.empty_like(poles), []
     left = list(range(values.size))
     for k, pole in enumerate(poles.tolist()):
-        place = min(left, key=lambda other, pole=pole: abs(values[other] - pole))
+        place = left[int(np.abs(values[left] - pole).argmin())]
         left.remove(place)
         places.append(place)
         found[k] = values[place]

@@ -46,7 +46,7 @@ DECADES = 2.0  #: of the band below its upper end
 ALLOWED = 0.05  #: error relative to a channel's largest value, or of a resonance's height, that is warned of
 ALLOWED_SHIFT = 0.01  #: relative shift of a resonance that is warned of
 BANDWIDTHS = 5.0  #: half-power bandwidths that frequencies between resonances keep from them
-SHARPEST = 1e-4  #: half-power bandwidth of an undamped resonance, in 2 pi of its frequency
+SHARPEST = 5e-4  #: half-power bandwidth of an undamped resonance, in 2 pi of its frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -138,7 +138,7 @@ def truncate_modes(
     -----
     DOFs are kept for every input and output that touches up to six of them, for dampers and for half DOFs. A damping
     ``alpha M + beta K`` needs none, nor does a damping that is spread over more than 1000 DOFs. Inputs and outputs that
-    touch more DOFs get a static correction each. Errors at resonances are shifts of frequency and damping and the change
+    touch more DOFs get a static correction each. Errors at resonances are shifts of frequency and damping and changes
     of the height, one solve with the full model for each; at other frequencies the error is that of the whole transfer
     function, phase included.
 

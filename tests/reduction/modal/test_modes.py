@@ -117,8 +117,8 @@ def test_slices_find_clustered_modes_all() -> None:
     omega^2 = k + 4 c sin^2(j pi / (2 n + 2)).
     """
     n, ground, coupling = 300, 1e4, 10.0
-    chain = diags_array([-np.ones(n - 1), 2.0 * np.ones(n), -np.ones(n - 1)], offsets=[-1, 0, 1])
-    K, M = csc_array(coupling * chain + ground * diags_array(np.ones(n))), csc_array(diags_array(np.ones(n)))
+    chain = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    K, M = csc_array(coupling * chain + ground * np.eye(n)), csc_array(np.eye(n))
     squares, shapes = slices.modes_by_slices(K, M, 200)
     desired = ground + 4.0 * coupling * np.sin(np.arange(1, 201) * np.pi / (2 * n + 2)) ** 2
     assert_allclose(squares, desired, rtol=1e-12)
