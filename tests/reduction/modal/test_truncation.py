@@ -72,7 +72,7 @@ def test_a_frame_gets_small_and_its_error_is_what_it_says() -> None:
 def test_the_error_on_a_fine_grid_is_near_the_one_that_is_told(proportional: float) -> None:
     """Lightly damped peaks neither hide the errors beside them nor slip between a few frequencies.
 
-    At the needles of an undamped model it is their shift that is told, so that the grid keeps 2 per cent away from them.
+    At the needles of an undamped model their shift is told, so that the grid keeps 2 per cent away from them.
     """
     model = frame_model(proportional=proportional)
     small = truncate_modes(model, f_max=20.0)
