@@ -31,6 +31,7 @@ from halfdof_ctrl.commands import (
 )
 from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
+from halfdof_ctrl.systems.state_map import KINDS
 
 PROGRAM = "halfdof-ctrl"
 INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
@@ -99,7 +100,8 @@ def _parser() -> argparse.ArgumentParser:
         needed=True,
     )
     add("info", run_info, "print what is in the files, the model, its pencil and its reduction", None)
-    add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
+    ss = add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
+    ss.add_argument("--states", choices=KINDS, default="dofs", help="what the states are (default: dofs)")
     bode = add("bode", run_bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")

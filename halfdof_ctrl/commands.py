@@ -27,6 +27,7 @@ from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.report import check_as_json, default_design, write_report
 from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
@@ -83,6 +84,10 @@ def run_info(arguments: argparse.Namespace) -> int:
         kind = "regular" if structure.is_regular else "SINGULAR"
         finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
         print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
+        form = energy_system(model)
+        if form is not None and form.n_rigid:
+            zeros = int(np.count_nonzero(np.linalg.eigvals(form.A) == 0.0))
+            print(f"Free motions: {form.n_rigid}, {zeros} poles at exactly 0, so that some static response is infinite")
     try:
         print(exact_reduction(model))
     except HalfdofError as refusal:
@@ -93,7 +98,7 @@ def run_info(arguments: argparse.Namespace) -> int:
 def run_ss(arguments: argparse.Namespace) -> int:
     """Write or print the state space."""
     _require_ending(arguments.o, MATRIX_ENDINGS)
-    system = mech2ss(_model(arguments))
+    system = mech2ss(_model(arguments), states=arguments.states)
     if arguments.o is None:
         print(system)
     else:

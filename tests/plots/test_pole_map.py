@@ -12,11 +12,11 @@ from support.figures import legend_texts, marked, mount, stiff
 
 
 def test_pole_map_shows_poles_eigenvalues_and_zeros() -> None:
-    """Crosses are eig(A), circles the finite eigenvalues of the pencil, diamonds `zeros` of the model."""
+    """Crosses are the poles of the state space, circles the finite eigenvalues of the pencil, diamonds `zeros`."""
     cplt = pole_map_plot(mount())
     lines = cplt.lines[0, 0]
     poles = marked(lines, "poles of A")
-    assert_allclose(np.sort_complex(poles), np.sort_complex(np.linalg.eigvals(exact_reduction(mount()).A)), rtol=1e-13)
+    assert_allclose(np.sort_complex(poles), np.sort_complex(np.linalg.eigvals(exact_reduction(mount()).A)), rtol=1e-12)
     assert_array_equal(marked(lines, "finite eigenvalues"), pencil_structure(mount()).finite_eigenvalues)
     assert_array_equal(marked(lines, "zeros"), zeros(mount()))
 

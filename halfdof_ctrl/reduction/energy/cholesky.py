@@ -4,7 +4,7 @@
 entries leave open where the stiffness of a structure ranges over many decades. One Newton step with the residual in
 twice the working precision repairs that:
 
-    E = K - U^T U,    G = U^-T E U^-1,    U <- (I + striu(G) + diag(G) / 2) U                  (20)
+    E = K - U^T U,    G = U^-T E U^-1,    U <- (I + striu(G) + diag(G) / 2) U                  (23)
 
 It would fill exact zeros with roundings; above the first entry of a column of K the factor is zero, and is kept so.
 """

@@ -2,7 +2,7 @@
 
 With K = U^T U, static DOFs first, U = [U_kk U_kr; 0 U_rr], L = U_rr^T, and M_ii = R^T R the states are
 
-    z = L^T q_r  (strain),   v = R q'_i  (momentum),   q'_c = C_cc^-1 (B_c u - L_c z - C_ci R^-1 v),       (23)
+    z = L^T q_r  (strain),   v = R q'_i  (momentum),   q'_c = C_cc^-1 (B_c u - L_c z - C_ci R^-1 v),       (26)
 
 and ``z^T z / 2 + v^T v / 2`` is the energy. The trailing block U_rr *is* the static condensation. With
 B_r := B_r - U_kr^T U_kk^-T B_k,
@@ -50,7 +50,7 @@ class EnergyForm:
     n_massive: int  #: number of them with mass, whose momenta come next
     n_strains: int  #: number of strains, which follow; the rest are momenta
     nearest: (
-        float  #: energy over rounding, ratio (22) over eps, of the softest motion that is not free; inf if not near
+        float  #: energy over rounding, ratio (25) over eps, of the softest motion that is not free; inf if not near
     )
 
     @property
@@ -143,7 +143,7 @@ def _mass_error(model: SecondOrderModel, parts: Parts) -> EnergyFormError:
 
 
 class _Assembly:
-    """The blocks of (23), for one model."""
+    """The blocks of (26), for one model."""
 
     def __init__(self, model: SecondOrderModel, parts: Parts, factor: StiffnessFactor, mass: FloatArray) -> None:
         self.model, self.parts, self.mass = model, parts, mass
@@ -157,6 +157,8 @@ class _Assembly:
         self.C = parts.C[np.ix_(moving, moving)]
         self.free: FreeMotions = free_motions(factor, n_k, self.i, mass, self.C)
         self.nearest = factor.nearest
+        self.half = self._half_velocity()  # q'_c of the states, less what v_r carries along
+        self.driven_half = [self.damping.solve(B[self.c]) for B in self._inputs()]
 
     def form(self) -> EnergyForm:
         """Put the blocks together."""
@@ -207,10 +209,9 @@ class _Assembly:
         n_p, n_m, n_z, n_e = free.count, free.massive, L.shape[1], free.complement.shape[1]
         size = n_p + n_m + n_z + n_e
         p, r, z, e = np.split(np.arange(size), np.cumsum([n_p, n_m, n_z]))
-        half = self._half_velocity()  # of the states, less Phi_c v_r
         velocity = np.zeros((len(L), size))  # q'_r less Phi v_r
         velocity[np.ix_(self.i, e)] = solved(self.mass, free.complement)
-        velocity[self.c] = half
+        velocity[self.c] = self.half
         A = np.zeros((size, size))
         A[p] = free.rates @ velocity[free.supports]
         A[np.ix_(p, r)] += free.carried_rates
@@ -224,15 +225,15 @@ class _Assembly:
         self._mirror(A, z, e)
         A += 0.0  # without negative zeros
         driven = []
-        for B in self._inputs():
+        for B, of_half in zip(self._inputs(), self.driven_half, strict=True):
             direct = np.zeros((len(L), B.shape[1]))
-            direct[self.c] = self.damping.solve(B[self.c])
+            direct[self.c] = of_half
             part = np.zeros((size, B.shape[1]))
             part[p] = free.rates @ direct[free.supports]
             part[z] = L.T @ direct
             pushed = B[self.i] - C[self.i] @ direct
             part[e] = free.complement.T @ solved(self.mass, pushed, transposed=True)
-            part[r] = free.massive_motions.T @ B - free.resisted @ direct
+            part[r] = free.balance.T @ B - free.resisted @ direct
             driven.append(part)
         return A, driven
 
@@ -262,12 +263,12 @@ class _Assembly:
         held[self.strained] = solved(self.L[self.strained].T, np.eye(n_z))
         q_r[:, n_p + n_m : n_p + n_m + n_z] = held - free.massive_motions @ (free.momenta @ held[self.i])
         v_r[self.i, n_p + n_m + n_z :] = solved(self.mass, free.complement)
-        v_r[self.c] = self._half_velocity()
-        v_r[:, n_p : n_p + n_m] += free.massive_motions
+        v_r[self.c] = self.half
+        v_r[:, n_p : n_p + n_m] += free.carried
         inputs = [np.asarray(B, dtype=float) for B in trimmed((model.B, model.Bv, model.Ba))]
         to_half = [np.zeros((n_r, m)) for _ in inputs]
-        for place, B in zip(to_half, self._inputs(), strict=False):
-            place[self.c] = self.damping.solve(B[self.c])
+        for place, of_half in zip(to_half, self.driven_half, strict=False):
+            place[self.c] = of_half
         flexible = [solved(self.U_kk, solved(self.U_kk, B[parts.static], transposed=True)) for B in inputs]
         across = -solved(self.U_kk, self.U_kr)
         q, v = np.zeros((2, n, size))

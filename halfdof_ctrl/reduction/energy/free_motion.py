@@ -3,9 +3,11 @@
 With Phi = null(K), the identity at the supports, QR with pivoting of R Phi_i = Q [R_1 R_2; 0 0] P^T tells the motions
 with mass from those without:
 
-    Phi_m = Phi P [R_1^-1; 0],  Phi_m,i^T M Phi_m,i = I,       Phi_0 = Phi P [-R_1^-1 R_2; I],  Phi_0,i = 0.       (24)
+    Phi_m = Phi P [R_1^-1; 0],  Phi_m,i^T M Phi_m,i = I,       Phi_0 = Phi P [-R_1^-1 R_2; I],  Phi_0,i = 0.       (27)
 
-Forces of dampers on them that are rounding of sums that cancel, as in a body that nothing ties to the ground, are zero.
+With a velocity of Phi_m those of Phi_0 are carried along so that the dampers between them do not resist,
+``Phi_0^T C (Phi_m + Phi_0 G) = 0``. Forces of dampers that are rounding of sums that cancel, as in a body that nothing
+ties to the ground, are zero.
 """
 
 from dataclasses import dataclass
@@ -33,9 +35,11 @@ class FreeMotions:
     complement: FloatArray  #: (n_i, n_i - n_m) N, orthonormal, orthogonal to R Phi_m
     rates: FloatArray  #: (d, d) of p' from velocities at the supports; zero for motions with mass
     carried_rates: FloatArray  #: (d, n_m) of p' from v_r
-    damping: FloatArray  #: (r, n_m) C Phi_m
-    resisted: FloatArray  #: (n_m, r) Phi_m^T C
-    resisted_rigid: FloatArray  #: (n_m, n_m) Phi_m^T C Phi_m
+    carried: FloatArray  #: (r, n_m) Phi_m + Phi_0 G: the velocities that belong to v_r
+    balance: FloatArray  #: (r, n_m) the same for the transpose of C: the sums of equations that v_r' comes from
+    damping: FloatArray  #: (r, n_m) C times `carried`
+    resisted: FloatArray  #: (n_m, r) the transpose of `balance` times C
+    resisted_rigid: FloatArray  #: (n_m, n_m) what of both is left of C
 
     @property
     def count(self) -> int:
@@ -86,10 +90,8 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
     without[i] = 0.0
     rates = np.zeros((d, d))
     rates[np.arange(n_m, d), order[n_m:]] = 1.0
-    ahead = np.vstack([np.eye(n_m), rates[n_m:] @ with_mass[supports]])
-    C_motion = _balanced(C, with_mass)
-    resisted = _balanced(C.T, with_mass).T
-    rigid = np.where(resisted.any() and C_motion.any(), with_mass.T @ C_motion, 0.0)
+    along, balance = (_carrying(matrix, with_mass, without) for matrix in (C, C.T))
+    C_motion, resisted = _balanced(C, along), _balanced(C.T, balance).T
     return FreeMotions(
         supports=supports,
         motions=np.hstack([with_mass, without]),
@@ -97,11 +99,21 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
         momenta=(mass.T @ (mass @ with_mass[i])).T,
         complement=Q[:, n_m:],
         rates=rates,
-        carried_rates=ahead,
+        carried_rates=np.vstack([np.eye(n_m), rates[n_m:] @ along[supports]]),
+        carried=along,
+        balance=balance,
         damping=C_motion,
         resisted=resisted,
-        resisted_rigid=rigid,
+        resisted_rigid=balance.T @ C_motion if resisted.any() else np.zeros((n_m, n_m)),
     )
+
+
+def _carrying(C: FloatArray, with_mass: FloatArray, without: FloatArray) -> FloatArray:
+    """Add motions without mass to those with mass, so that dampers do not act on the former."""
+    if 0 in (with_mass.shape[1], without.shape[1]):
+        return with_mass
+    share = np.linalg.lstsq(without.T @ C @ without, -without.T @ exact_product(C, with_mass))[0]
+    return np.asarray(with_mass + without @ share)
 
 
 def _balanced(C: FloatArray, motions: FloatArray) -> FloatArray:
@@ -120,6 +132,8 @@ def _none(size: int, n_i: int) -> FreeMotions:
         complement=np.eye(n_i),
         rates=np.zeros((0, 0)),
         carried_rates=np.zeros((0, 0)),
+        carried=np.zeros((size, 0)),
+        balance=np.zeros((size, 0)),
         damping=np.zeros((size, 0)),
         resisted=np.zeros((0, size)),
         resisted_rigid=np.zeros((0, 0)),

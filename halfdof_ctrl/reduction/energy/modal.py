@@ -38,6 +38,8 @@ def modal_form(form: EnergyForm) -> EnergyForm:
     [2.0, 3.0]
     """
     first = form.n_rigid + form.n_massive
+    if len(form.A) == first + form.n_strains:  # no mass that a stiffness holds: nothing swings
+        return replace(form, states=(*form.states[:first], *[f"half{k + 1}" for k in range(form.n_strains)]))
     z, e = np.arange(first, first + form.n_strains), np.arange(first + form.n_strains, len(form.A))
     G = form.from_q[z] @ _velocity_of_momenta(form, e)
     P, omega, Qt = scipy.linalg.svd(G, full_matrices=True)

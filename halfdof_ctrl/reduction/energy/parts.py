@@ -88,6 +88,7 @@ class HalfDamping:
         self.columns = powers_of_two(np.abs(self.rows[:, None] * C).max(axis=0, initial=0.0))
         self.matrix = self.rows[:, None] * C * self.columns
         self.factors = None
+        self.diagonal: FloatArray | None = None  #: of C_cc, where each half DOF has a damper of its own
         if C.size == 0:
             return
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -101,11 +102,15 @@ class HalfDamping:
             )
             raise EnergyFormError(msg, reason="singular damping", dofs=tuple(names))
         self.factors = (factors, pivots)
+        if np.count_nonzero(C) == np.count_nonzero(np.diagonal(C)):
+            self.diagonal = np.diagonal(C)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``C_cc^-1 right``, refined once with an exact residual."""
         if self.factors is None:
             return np.array(right)
+        if self.diagonal is not None:
+            return np.asarray(right / self.diagonal[:, None])
         scaled = self.rows[:, None] * right
         x = scipy.linalg.lu_solve(self.factors, scaled, check_finite=False)
         x += scipy.linalg.lu_solve(self.factors, exact_residual(scaled, self.matrix, x), check_finite=False)

@@ -1,6 +1,6 @@
 """Port-Hamiltonian form, and the certificate that a model is passive.
 
-    x' = (J - R) Q x + B u,    J = -J^T,  R = R^T,    energy E = x^T Q x / 2                 (25)
+    x' = (J - R) Q x + B u,    J = -J^T,  R = R^T,    energy E = x^T Q x / 2                 (28)
     E' = -(Q x)^T R (Q x) + (Q x)^T B u
 
 in energy coordinates, Q the identity but for zeros at displacements of free motions, which hold no energy. With u = 0
@@ -24,7 +24,7 @@ SHARE = 0.1  #: of the largest power that enters: DOFs with less are not named
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
 class PortHamiltonian:
-    """Equation (25) for N states and m inputs. Made by `port_hamiltonian`."""
+    """Equation (28) for N states and m inputs. Made by `port_hamiltonian`."""
 
     J: FloatArray  #: (N, N) skew: energy that is exchanged
     R: FloatArray  #: (N, N) symmetric: energy that is lost

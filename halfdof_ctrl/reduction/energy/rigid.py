@@ -3,11 +3,11 @@
 A structure that floats has a K with null vectors Phi, exact ones for translations and some that hold to the rounding of
 the entries of K for rotations. With as many support DOFs 2 as there are free motions and the others 1,
 
-    K = U^T U,   U = [U_11 U_12],   Phi = [-U_11^-1 U_12; I],   U Phi = 0.                  (21)
+    K = U^T U,   U = [U_11 U_12],   Phi = [-U_11^-1 U_12; I],   U Phi = 0.                  (24)
 
 A motion counts as free if its energy is rounding of the terms that it is summed from,
 
-    |Phi^T K Phi| <= eps |Phi|^T |K| |Phi|,                                                 (22)
+    |Phi^T K Phi| <= eps |Phi|^T |K| |Phi|,                                                 (25)
 
 without a factor n: the first bending mode of a clamped beam of 20 000 DOFs stands at 0.12 eps. What tells it from a
 rotation is the next mode, whose ratio must be a thousand times larger.
@@ -24,9 +24,9 @@ from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
-SUSPICIOUS = 4.0  #: times n eps of the diagonal: a smaller pivot may stand for a free motion
-NEXT = 1e3  #: the ratio (22) of the next mode is larger than that of a free motion by this factor
-NEARLY_FREE = 30.0  #: times eps: a ratio (22) up to which rounding of K changes the motion visibly
+SUSPICIOUS = 128.0  #: times n eps of the diagonal: a smaller pivot may stand for a motion that is free, or nearly
+NEXT = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
+NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
 FORWARD = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
 INVERSE_ITERATIONS = 8
 REFINEMENTS = 2
@@ -39,8 +39,8 @@ class StiffnessFactor:
     U: FloatArray  #: (n - d, n) factor; upper triangular in the columns `carried`
     carried: IndexArray  #: (n - d,) DOFs that are no supports, ascending
     supports: IndexArray  #: (d,) DOFs at which the free motions are measured
-    motions: FloatArray  #: (n, d) Phi of equation (21), the identity at the supports
-    nearest: float  #: ratio (22) over eps of the softest motion that is not free, where it was looked for, else inf
+    motions: FloatArray  #: (n, d) Phi of equation (24), the identity at the supports
+    nearest: float  #: ratio (25) over eps of the softest motion that is not free, where it was looked for, else inf
 
 
 def stiffness_factor(K: FloatArray, first: int, names: tuple[str, ...]) -> StiffnessFactor:
@@ -121,7 +121,7 @@ def _require_diagonal(K: FloatArray, names: tuple[str, ...]) -> None:
 
 def indefinite_error(letter: str, dofs: list[str]) -> EnergyFormError:
     """Make the refusal of an energy that is negative in some motion."""
-    meaning = {"K": "elastic energy (negative stiffness, a follower force)", "M": "kinetic energy"}[letter]
+    meaning = {"K": "elastic energy (negative stiffness, a constraint)", "M": "kinetic energy"}[letter]
     msg = (
         f"There are no energy coordinates: {letter} is not positive semidefinite, so that a motion of DOFs "
         f"{', '.join(dofs[:8])} has negative {meaning}. Keep states='dofs', or 'scaled' for python-control."
@@ -139,22 +139,39 @@ def _undecided(nearest: float, names: tuple[str, ...], candidates: IndexArray) -
 
 
 def _candidates(K: FloatArray, first: int, names: tuple[str, ...]) -> IndexArray:
-    """Return the DOFs whose pivots are small in a pivoted factorization, static DOFs going first."""
+    """Return the fewest DOFs without which K is positive definite, those with the smallest pivots."""
+    order, rank = _pivots(K, first, names)
+    for count in range(order.size - rank, order.size + 1):
+        candidates = np.sort(order[order.size - count :])
+        carried = np.setdiff1d(np.arange(len(K)), candidates)
+        if corrected_factor(K[np.ix_(carried, carried)]) is not None:
+            return candidates
+    raise indefinite_error("K", list(names[:first]))
+
+
+def _pivots(K: FloatArray, first: int, names: tuple[str, ...]) -> tuple[IndexArray, int]:
+    """Return the DOFs in the order of a pivoted factorization behind static ones, and how many pivots are not small."""
     n = len(K)
     schur = np.array(K[first:, first:])
     if first:
         U, failed = dpotrf(K[:first, :first], lower=0, clean=1)
-        if failed:
-            floating = names[failed - 1]
-            msg = (
-                f"There are no energy coordinates: static DOF {floating} (no mass, no damping) moves without any force "
-                "together with others of its kind, or K is indefinite there. Tie it with a spring or remove it."
-            )
-            raise EnergyFormError(msg, reason="floating", dofs=(floating,))
+        small = np.diagonal(U) ** 2 <= SUSPICIOUS * n * EPS * np.diagonal(K)[:first]
+        if failed or small.any():
+            raise _floating_error(names[failed - 1 if failed else int(np.argmax(small))])
         half = solved(U, K[:first, first:], transposed=True)
         schur -= half.T @ half
+    none = bool(np.diagonal(schur).max(initial=0.0) <= SUSPICIOUS * n * EPS)  # dpstrf asks it of later pivots only
     _, order, rank, _ = dpstrf(schur, tol=SUSPICIOUS * n * EPS)
-    return np.sort(first + order[rank:] - 1).astype(np.intp)
+    places = first + (np.arange(n - first) if none else order - 1)
+    return places.astype(np.intp), 0 if none else int(rank)
+
+
+def _floating_error(dof: str) -> EnergyFormError:
+    msg = (
+        f"There are no energy coordinates: static DOF {dof} (no mass, no damping) moves without any force, alone or "
+        "together with others of its kind, or the stiffness is negative there. Tie it with a spring or remove it."
+    )
+    return EnergyFormError(msg, reason="floating", dofs=(dof,))
 
 
 def _null_vectors(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> FloatArray:
@@ -162,7 +179,7 @@ def _null_vectors(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -
 
 
 def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> StiffnessFactor:
-    """Return the factor (21) and its null vectors, for given supports."""
+    """Return the factor (24) and its null vectors, for given supports."""
     carried = np.setdiff1d(np.arange(len(K)), supports)
     inner, beside = K[np.ix_(carried, carried)], K[np.ix_(carried, supports)]
     factor = corrected_factor(inner)
@@ -184,14 +201,14 @@ def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) 
 
 
 def _ratios(K: FloatArray, motions: FloatArray) -> FloatArray:
-    """Return the ratios (22) over eps, signed, of some motions."""
+    """Return the ratios (25) over eps, signed, of some motions."""
     energy = np.einsum("ij,ij->j", motions, exact_product(K, motions))
     terms = np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions))
     return np.asarray(energy / np.where(terms > 0.0, terms * EPS, 1.0))
 
 
 def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) -> tuple[FloatArray, float]:
-    """Return those combinations of candidates that are free by (22), and the smallest ratio of the others."""
+    """Return those combinations of candidates that are free by (25), and the smallest ratio of the others."""
     if motions.shape[1] == 0:
         return motions, np.inf
     size = np.sqrt(np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions)))
@@ -210,7 +227,7 @@ def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) ->
 
 
 def _next_ratio(K: FloatArray, supports: IndexArray, motions: FloatArray) -> float:
-    """Return the ratio (22) over eps of the softest motion beside those given, by inverse iteration."""
+    """Return the ratio (25) over eps of the softest motion beside those given, by inverse iteration."""
     carried = np.setdiff1d(np.arange(len(K)), supports)
     factor = corrected_factor(K[np.ix_(carried, carried)])
     if factor is None or carried.size == 0:
