@@ -1,13 +1,17 @@
-"""The exceptions and warnings of the package."""
+"""The exceptions and warnings of the package: the public path of what `base.errors` defines."""
 
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
+    DataLimitWarning,
+    EnergyFormError,
     FailedCasesWarning,
     FileFormatError,
     HalfdofError,
+    HalfdofWarning,
     ImportedModelWarning,
     ImproperError,
+    InaccurateGainWarning,
     InconsistentStateError,
     InterruptedResponseWarning,
     LawError,
@@ -18,6 +22,7 @@ from halfdof_ctrl.base.errors import (
     ModelSizeError,
     NearlyMasslessWarning,
     NoAnswerError,
+    NoStateSpaceError,
     ParameterError,
     SignalNameError,
     SingularLeadingMatrixError,
@@ -33,11 +38,15 @@ from halfdof_ctrl.base.errors import (
 __all__ = [
     "CloseDecisionWarning",
     "ComplexModelError",
+    "DataLimitWarning",
+    "EnergyFormError",
     "FailedCasesWarning",
     "FileFormatError",
     "HalfdofError",
+    "HalfdofWarning",
     "ImportedModelWarning",
     "ImproperError",
+    "InaccurateGainWarning",
     "InconsistentStateError",
     "InterruptedResponseWarning",
     "LawError",
@@ -48,6 +57,7 @@ __all__ = [
     "ModelSizeError",
     "NearlyMasslessWarning",
     "NoAnswerError",
+    "NoStateSpaceError",
     "ParameterError",
     "SignalNameError",
     "SingularLeadingMatrixError",
@@ -59,3 +69,6 @@ __all__ = [
     "WeightError",
     "WorkerError",
 ]
+
+for _name in __all__:
+    globals()[_name].__module__ = __name__  # tracebacks, warning filters, pickles and the documentation name this path

@@ -119,7 +119,7 @@ def measure_frequency_response() -> None:
         )
         what = f"frequency_response, {states} states" + (", deep roll-off" if far_end else "")
         report(what, ours, theirs, "control.frequency_response", "(none)" if far_end else ">= 5")
-        if far_end:  # a plain solve is no reference there; tests/test_hessenberg.py has one in many digits
+        if far_end:  # a plain solve is no reference there; tests/systems/test_hessenberg.py has one in many digits
             continue
         few = omega[:: POINTS // 20]
         unit = np.eye(system.nstates)

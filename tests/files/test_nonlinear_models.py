@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.mounts_with_laws import oil_mount
 
 import halfdof_ctrl as hd
 from halfdof_ctrl import Damper, Law, NonlinearModel, Spring, laws, load_model, mechss, nlmechss, save_model
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.errors import FileFormatError, ParameterError
+from support.mounts_with_laws import oil_mount
 
 
 @pytest.mark.parametrize("ending", [".npz", ".mat"])

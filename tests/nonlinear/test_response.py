@@ -7,8 +7,6 @@ import pytest
 import scipy.optimize
 from numpy.testing import assert_allclose
 from scipy.special import ellipk
-from support.descriptor_integration import Element, integrated
-from support.mounts_with_laws import inputs, oil_mount
 
 import halfdof_ctrl as hd
 from halfdof_ctrl import Damper, Force, Law, Spring, laws, mechss, nlmechss, nonlinear_response
@@ -22,6 +20,8 @@ from halfdof_ctrl.errors import (
     SignalNameError,
 )
 from halfdof_ctrl.nonlinear import response as module
+from support.descriptor_integration import Element, integrated
+from support.mounts_with_laws import inputs, oil_mount
 
 PROMISED = 1e-6  #: of the largest value of each DOF, at the default tolerance
 CLOSED = 1e-8  #: of the largest displacement, against closed forms

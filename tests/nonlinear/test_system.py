@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from support.mounts_with_laws import oil_mount
 
 import halfdof_ctrl as hd
 from halfdof_ctrl import Damper, Law, Spring, laws, mech2nlsys, mech2ss, mechss, nlmechss
 from halfdof_ctrl.errors import ImproperError, LawError
+from support.mounts_with_laws import oil_mount
 
 LINEAR = 1e-12  #: a linear law through the nonlinear way, of the largest entry
 SLOPE = 1e-9  #: analytic slopes against closed forms

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 import scipy.optimize
 from numpy.testing import assert_allclose
-from support.mounts_with_laws import oil_mount
 
 import halfdof_ctrl as hd
 from halfdof_ctrl import Damper, Force, Spring, laws, mech2nlsys, mech2ss, mechss, nlmechss
 from halfdof_ctrl.errors import LawError, LostStateWarning, MatrixError, SignalNameError
+from support.mounts_with_laws import oil_mount
 
 DIGITS = 1e-10  #: of the largest entry, tangent against linearization
 
