@@ -1,6 +1,7 @@
 """The exceptions and warnings of the package."""
 
 from halfdof_ctrl.base.errors import (
+    AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
     FailedCasesWarning,
@@ -31,6 +32,7 @@ from halfdof_ctrl.base.errors import (
 )
 
 __all__ = [
+    "AssemblyError",
     "CloseDecisionWarning",
     "ComplexModelError",
     "FailedCasesWarning",

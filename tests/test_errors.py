@@ -8,6 +8,7 @@ import pytest
 
 from halfdof_ctrl.base import errors
 from halfdof_ctrl.base.errors import (
+    AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
     FileFormatError,
@@ -31,6 +32,7 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.files.naming import naming_the_file
 
 EXAMPLES: list[HalfdofError] = [
+    AssemblyError("Nothing holds part a", names=("a",)),
     MatrixError("K is empty", matrix="K"),
     ComplexModelError("K is complex", matrices=("K", "C")),
     SignalNameError("no such name", names=("a",)),

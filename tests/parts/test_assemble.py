@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import halfdof_ctrl as hd
 import halfdof_ctrl.nonlinear.reduction  # registers what nlmechss asks
-from halfdof_ctrl.base.errors import ParameterError, SignalNameError
+from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.model.nonlinear import NonlinearModel
-from halfdof_ctrl.parts.joints import AnyJoint, AssemblyError
+from halfdof_ctrl.parts.joints import AnyJoint
 
 BY_HAND = 1e-14  # the same sums in another order
 SOLVED = 1e-10  # two formulations of one model, each by a solve
