@@ -1,14 +1,18 @@
-"""The exceptions and warnings of the package."""
+"""The exceptions and warnings of the package: the public path of what `base.errors` defines."""
 
 from halfdof_ctrl.base.errors import (
     AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
+    DataLimitWarning,
+    EnergyFormError,
     FailedCasesWarning,
     FileFormatError,
     HalfdofError,
+    HalfdofWarning,
     ImportedModelWarning,
     ImproperError,
+    InaccurateGainWarning,
     InconsistentStateError,
     InterruptedResponseWarning,
     LawError,
@@ -19,6 +23,7 @@ from halfdof_ctrl.base.errors import (
     ModelSizeError,
     NearlyMasslessWarning,
     NoAnswerError,
+    NoStateSpaceError,
     ParameterError,
     SignalNameError,
     SingularLeadingMatrixError,
@@ -35,11 +40,15 @@ __all__ = [
     "AssemblyError",
     "CloseDecisionWarning",
     "ComplexModelError",
+    "DataLimitWarning",
+    "EnergyFormError",
     "FailedCasesWarning",
     "FileFormatError",
     "HalfdofError",
+    "HalfdofWarning",
     "ImportedModelWarning",
     "ImproperError",
+    "InaccurateGainWarning",
     "InconsistentStateError",
     "InterruptedResponseWarning",
     "LawError",
@@ -50,6 +59,7 @@ __all__ = [
     "ModelSizeError",
     "NearlyMasslessWarning",
     "NoAnswerError",
+    "NoStateSpaceError",
     "ParameterError",
     "SignalNameError",
     "SingularLeadingMatrixError",
@@ -61,3 +71,6 @@ __all__ = [
     "WeightError",
     "WorkerError",
 ]
+
+for _name in __all__:
+    globals()[_name].__module__ = __name__  # tracebacks, warning filters, pickles and the documentation name this path

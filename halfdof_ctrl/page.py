@@ -24,7 +24,7 @@ from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE
 
 SHOWN_STATES = 12  #: larger matrices are in the files only
 SHOWN_EIGENVALUES = 40
-MARK = "halfdof-ctrl"  #: stands in the page and tells it from others
+PAGE_MARK = "halfdof-ctrl"  #: stands in the page and tells it from others
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ def page(findings: Findings, figures: Sequence[PageFigure], files: Iterable[str]
     template = importlib.resources.files("halfdof_ctrl").joinpath("report.html").read_text(encoding="utf-8")
     verdict, look = ("Cross-check passed", "good") if findings.check.passed else ("Cross-check FAILED", "bad")
     return string.Template(template).substitute(
-        mark=f"{MARK} {_version('halfdof_ctrl')}",
+        mark=f"{PAGE_MARK} {_version('halfdof_ctrl')}",
         title=html.escape(findings.model.name or "Mechanical model"),
         summary=html.escape(_summary(findings)),
         verdict=f'<span class="verdict {look}">{verdict}</span>',

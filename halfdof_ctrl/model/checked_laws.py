@@ -26,7 +26,8 @@ def check_law(law: Law, element: str, dofs: tuple[str, ...]) -> None:
         given = values if what != "inverse" else 0.0 * values
         _check_values(_tried(function, given, what, element, dofs), given.shape, what, element, dofs)
         _check_values(_tried(function, float(given[0]), what, element, dofs), (), what, element, dofs)
-    at_rest = float(law.force(0.0)) if law.domain[0] <= 0.0 <= law.domain[1] else float("nan")
+    with np.errstate(all="ignore"):
+        at_rest = float(np.asarray(law.force(np.zeros(1)))[0])
     if not np.isfinite(at_rest):
         msg = f"The law of {element} gives {at_rest} at zero, where every motion begins. Define it there."
         raise LawError(msg, element=element, dofs=dofs)
@@ -45,6 +46,7 @@ def check_force(force: Force, element: str) -> None:
     values = _tried(
         lambda at: force.function(at[: q.size], at[q.size :], 0.0), np.concatenate([q, v]), "law", element, force.on
     )
+    values = np.reshape(values, shape) if np.ndim(values) == 0 and shape == (1,) else values
     _check_values(values, shape, "law", element, force.on)
     if not np.isfinite(np.asarray(values, dtype=float)).all():
         msg = f"The law of {element} gives {values} at zero, where every motion begins. Define it there."
@@ -68,8 +70,8 @@ def _tried(function: Any, values: Any, what: str, element: str, dofs: tuple[str,
             return function(values)
     except (TypeError, ValueError, ArithmeticError, LookupError, AttributeError) as cause:
         msg = (
-            f"The {what} of {element} cannot be called with {'an array' if np.ndim(values) else 'a number'}: {cause}. It "
-            "must take both and return as much."
+            f"The {what} of {element} cannot be called with {'an array' if np.ndim(values) else 'a number'}: {cause}. "
+            "It must take both and return as much."
         )
         raise LawError(msg, element=element, dofs=dofs) from cause
 

@@ -259,7 +259,8 @@ def table(x: npt.ArrayLike, f: npt.ArrayLike, extend: Literal["linear"] | None =
     x, f : array_like
         At least two points; x rises.
     extend : {"linear"}, optional
-        Go on straight outside the points, with the slope at the last one. By default the law is refused there, since
+        Go on straight outside the points, with the slope at the last one, or that of the last interval where the
+        curve ends level. By default the law is refused there, since
         nothing was measured.
 
     Raises

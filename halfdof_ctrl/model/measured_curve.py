@@ -33,7 +33,8 @@ class MeasuredCurve:
         smooth = PchipInterpolator(points, values)
         slopes = np.asarray(smooth.derivative()(points), dtype=float)
         before, after = np.zeros((2, 4, 1))
-        before[2:, 0], after[2:, 0] = (slopes[0], values[0]), (slopes[-1], values[-1])
+        secants = np.diff(values) / np.diff(points)  # PCHIP may end level although the last points still rise
+        before[2:, 0], after[2:, 0] = (slopes[0] or secants[0], values[0]), (slopes[-1] or secants[-1], values[-1])
         return cls(
             points=read_only(points),
             values=read_only(values),
@@ -44,8 +45,8 @@ class MeasuredCurve:
 
     @property
     def end_slopes(self) -> tuple[float, float]:
-        """Slopes at the first and at the last point."""
-        return float(self.slopes[0]), float(self.slopes[-1])
+        """Slopes before the first and behind the last point."""
+        return float(self.coefficients[2, 0]), float(self.coefficients[2, -1])
 
     def __call__(self, x: Any) -> Any:  # noqa: ANN401  # a number or an array
         """Give the force at x; NaN outside the points unless the curve is extended."""

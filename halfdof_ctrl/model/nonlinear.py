@@ -1,6 +1,6 @@
 """The nonlinear model: M, C, K with springs, dampers and forces whose laws are not linear.
 
-    M q'' + C q' + K q + sum of e_k phi_k = B u,    y = F q + G q' + H q'' + D u                   (20)
+    M q'' + C q' + K q + sum of e_k phi_k = B u,    y = F q + G q' + H q'' + D u                   (N1)
 
 The model is plain data. What its DOFs are, how it moves and what its tangent is comes from the room `nonlinear`, which
 registers itself with `reduced` here, so that imports point down. Derivation: docs/explanation/nonlinear.md.
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SignalNameError
-from halfdof_ctrl.base.names import Names, listed, unknown_name_error
+from halfdof_ctrl.base.names import Names, listed, reaction_names, unknown_name_error
 from halfdof_ctrl.model.checked_laws import check_force, check_law
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
@@ -88,12 +88,15 @@ class NonlinearModel:
     @property
     def with_linear_elements(self) -> SecondOrderModel:
         """M, C, K with the elements whose law is a plain number."""
-        C, K = np.array(self.linear.C), np.array(self.linear.K)
+        C, K, F, G = (np.array(matrix) for matrix in (self.linear.C, self.linear.K, self.linear.F, self.linear.G))
         for element in self.elements:
             if isinstance(element, Spring | Damper) and not isinstance(element.law, Law):
                 e = direction(element, self.dofs)
-                (K if isinstance(element, Spring) else C)[...] += element.law * np.outer(e, e)
-        return replace(self.linear, C=read_only(C), K=read_only(K))
+                on_dofs, on_outputs = split_actions(e[:, None], self.linear)
+                left, seen = (K, F) if isinstance(element, Spring) else (C, G)
+                left += element.law * on_dofs @ e[None]
+                seen += element.law * on_outputs @ e[None]
+        return replace(self.linear, C=read_only(C), K=read_only(K), F=read_only(F), G=read_only(G))
 
     @property
     def nonlinear_elements(self) -> tuple[Element, ...]:
@@ -220,7 +223,7 @@ def nlmechss(
         A real, dense model of up to 500 DOFs; its signals are those of the nonlinear one. Motions are prescribed
         before: ``model.prescribe_motion("base", "acceleration")`` keeps the base as a DOF.
     elements : sequence of Spring, Damper and Force
-        What acts besides M, C and K, on the left of equation (20).
+        What acts besides M, C and K, on the left of equation (N1).
     name : str, optional
         By default that of `model`.
 
@@ -254,7 +257,8 @@ def nlmechss(
       damper 1: Damper("oil", law=quadratic(2))
       oil: half, by damper 1 (quadratic); its column of C is null
     """
-    if not isinstance(model, SecondOrderModel):
+    given_model: object = model
+    if not isinstance(given_model, SecondOrderModel):
         msg = f"nlmechss takes a model made by mechss and the elements to add, not a {type(model).__name__}."
         raise ParameterError(msg, parameter="model", value=model)
     if model.is_complex:
@@ -262,10 +266,13 @@ def nlmechss(
     if model.is_sparse or len(model.dofs) > LARGEST_NONLINEAR:
         msg = (
             f"Nonlinear models are dense and have up to {LARGEST_NONLINEAR} DOFs; this one is "
-            f"{'sparse' if model.is_sparse else 'dense'} and has {len(model.dofs)}: take as_dense() or truncate_modes first."
+            f"{'sparse' if model.is_sparse else 'dense'} and has {len(model.dofs)}: take as_dense() or truncate_modes "
+            "first."
         )
         raise ModelSizeError(msg, size=len(model.dofs), limit=LARGEST_NONLINEAR)
     given = (elements,) if isinstance(elements, Spring | Damper | Force) else tuple(elements)
+    for element in given:
+        _require_element(element)
     for element, words in zip(given, element_words(given), strict=True):
         _check(element, words, model)
     named = model if name is None else replace(model, name=name)
@@ -298,12 +305,35 @@ def element_dofs(element: Element) -> tuple[str, ...]:
 
 
 def direction(element: Spring | Damper, dofs: tuple[str, ...]) -> FloatArray:
-    """Return e of equation (20): 1 at a, -1 at b."""
+    """Return e of equation (N1): 1 at a, -1 at b."""
     e = np.zeros(len(dofs))
     e[dofs.index(element.a)] = 1.0
     if element.b is not None:
         e[dofs.index(element.b)] = -1.0
     return e
+
+
+def split_actions(E: FloatArray, model: SecondOrderModel) -> tuple[FloatArray, FloatArray]:
+    """Split what forces act on into equations of motion and reactions.
+
+    The equation of a DOF whose motion is prescribed is ``q'' = u``: no force moves it, and what acts there adds to the
+    reaction, where that is an output.
+
+    Returns
+    -------
+    E : (n, a) ndarray
+        Without the rows of prescribed DOFs.
+    R : (p, a) ndarray
+        These rows, at the outputs ``R_<dof>``.
+    """
+    E, R = np.array(E), np.zeros((len(model.outputs), E.shape[1]))
+    for dof, reaction in zip(model.prescribed, reaction_names(model.prescribed), strict=True):
+        if dof in model.dofs:
+            row = model.dofs.index(dof)
+            if reaction in model.outputs:
+                R[model.outputs.index(reaction)] = E[row]
+            E[row] = 0.0
+    return read_only(E), read_only(R)
 
 
 def _labels(elements: Sequence[Element]) -> list[str]:
@@ -322,17 +352,21 @@ def _law_name(element: Element) -> str:
     return element.law.name if isinstance(element.law, Law) else "linear"
 
 
-def _check(element: object, words: str, model: SecondOrderModel) -> None:
-    """Check an element against the model, and try its law."""
+def _require_element(element: object) -> None:
     if not isinstance(element, Spring | Damper | Force):
         msg = f"Elements are Spring, Damper and Force; {element!r} is a {type(element).__name__}."
         raise ParameterError(msg, parameter="elements", value=element)
+
+
+def _check(element: Element, words: str, model: SecondOrderModel) -> None:
+    """Check an element against the model, and try its law."""
     for dof in element_dofs(element):
         if dof not in model.dofs:
             if dof in model.prescribed:
                 msg = (
-                    f"{words} sits on {dof}, whose displacement is prescribed, so that it has left the model. Prescribe "
-                    f'its motion by model.prescribe_motion("{dof}", "acceleration") instead, which keeps it as a DOF.'
+                    f"{words} sits on {dof}, whose displacement is prescribed, so that it has left the model. "
+                    f'Prescribe its motion by model.prescribe_motion("{dof}", "acceleration") instead, which keeps '
+                    "it as a DOF."
                 )
                 raise SignalNameError(msg, names=(dof,))
             raise unknown_name_error(dof, f"DOF for {words}:", model.dofs)

@@ -1,12 +1,12 @@
 """Find the motions that answer the forces: ``w + S (f(w) - G w) = w_0(x, u)``, group by group.
 
-    w = w_0 + S d,    d = -(f(w, t) - G w)                                                         (22)
+    w = w_0 + S d,    d = -(f(w, t) - G w)                                                         (N3)
 
 d is what the elements do beyond the generic tangents G that the linear part holds. Variables that are states need no
 solving; the others fall into groups, the strong components of S, which follow one another. A group of one spring or
 damper is a scalar equation of a law that rises, with 1/S = G + rest:
 
-    f(w) + rest w = w_0 / S                                                                        (23)
+    f(w) + rest w = w_0 / S                                                                        (N4)
 
 A group of several is solved by `coupled`. Nothing is remembered between calls: equal arguments give equal results.
 """
@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import FloatArray
@@ -47,7 +46,7 @@ class Answers:
     groups: tuple[tuple[int, ...], ...]  #: places of each step that solves, in their order
 
     def solve(self, t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return w and d of equation (22).
+        """Return w and d of equation (N3).
 
         Raises
         ------
@@ -73,20 +72,24 @@ def answers_of(
     ----------
     geometry : Geometry
     S : (r, a) ndarray
-        Of equation (22); rows of elements on states are zero.
+        Of equation (N3); rows of elements on states are zero.
     slopes : sequence of ndarray
         G of each element, zero where it is on states.
     moving : sequence of bool
         Whether the element's variables must be solved for.
     roots : dict
-        The solution of (23), as a function of w_0 / S, for every spring and damper that stands alone.
+        The solution of (N4), as a function of w_0 / S, for every spring and damper that stands alone.
     """
     places = geometry.places
-    steps: list[Step] = [_explicit(place, slopes[k]) for k, place in enumerate(places) if not moving[k]]
-    groups = components(geometry, S, moving)
+    on_states = [k for k in range(len(places)) if not moving[k] and not S[places[k].arguments].any()]
+    steps: list[Step] = [_explicit(places[k], slopes[k]) for k in on_states]
+    groups = components(geometry, S, [k not in on_states for k in range(len(places))])
     for group in groups:
-        if len(group) == 1 and group[0] in roots:
-            steps.append(_alone(places[group[0]], S, roots[group[0]]))
+        place = places[group[0]]
+        if len(group) == 1 and not moving[group[0]]:
+            steps.append(_following(place, slopes[group[0]], S))
+        elif len(group) == 1 and group[0] in roots:
+            steps.append(_alone(place, S, roots[group[0]]))
         else:
             steps.append(_together(Group.of(geometry, S, slopes, group), S, [places[k] for k in group]))
     return Answers(S=S, steps=tuple(steps), groups=groups)
@@ -96,6 +99,8 @@ def components(geometry: Geometry, S: FloatArray, moving: Sequence[bool]) -> tup
     """Return the groups of elements that must be solved for together, each after those that it depends on."""
     implicit = [k for k in range(len(geometry.places)) if moving[k]]
     size = len(implicit)
+    if size == 0:
+        return ()
     link = np.zeros((size, size))
     for i, k in enumerate(implicit):
         for j, other in enumerate(implicit):
@@ -103,7 +108,7 @@ def components(geometry: Geometry, S: FloatArray, moving: Sequence[bool]) -> tup
             link[i, j] = block.max(initial=0.0)
     own = np.sqrt(np.abs(np.diag(link)))
     depends = link > UNCOUPLED * np.outer(own, own)
-    count, label = connected_components(csr_array(depends), directed=True, connection="strong")
+    count, label = connected_components(depends.astype(float), directed=True, connection="strong")
     groups = [[i for i in range(size) if label[i] == one] for one in range(count)]
     done: list[list[int]] = []
     while len(done) < count:  # a group comes when all that it depends on are there
@@ -138,8 +143,19 @@ def _explicit(place: Place, G: FloatArray) -> Step:
     return vector_step
 
 
+def _following(place: Place, G: FloatArray, S: FloatArray) -> Step:
+    """Evaluate an element whose variables follow the forces of others, not its own."""
+    evaluate, rows = _explicit(place, G), S[place.arguments]
+
+    def step(t: float, w: FloatArray, d: FloatArray) -> None:
+        w[place.arguments] += rows @ d
+        evaluate(t, w, d)
+
+    return step
+
+
 def _alone(place: Place, S: FloatArray, root: Root) -> Step:
-    """Solve (23) for one spring or damper."""
+    """Solve (N4) for one spring or damper."""
     row, column = place.arguments.start, place.forces.start
     own = float(S[row, column])
     others = np.array(S[row])
@@ -160,7 +176,7 @@ def _alone(place: Place, S: FloatArray, root: Root) -> Step:
 
 
 def _together(group: Group, S: FloatArray, places: list[Place]) -> Step:
-    """Solve (22) for several elements at once."""
+    """Solve (N3) for several elements at once."""
     solve = coupled_solver(group)
     outside = np.array(S[group.rows])
     outside[:, group.columns] = 0.0

@@ -34,7 +34,7 @@ def generic_slopes(base: SecondOrderModel, geometry: Geometry, seed: int) -> lis
     for place in geometry.places:
         rows = np.flatnonzero(geometry.E[:, place.forces].any(axis=1))
         by_q = geometry.L_q[place.arguments].any(axis=1)
-        scale = np.where(by_q, stiff[rows].max(), damped[rows].max())
+        scale = np.where(by_q, stiff[rows].max(initial=0.0), damped[rows].max(initial=0.0))
         slopes.append(scale * draw.uniform(0.5, 1.5, (geometry.E[:, place.forces].shape[1], by_q.size)))
     return slopes
 
@@ -69,7 +69,8 @@ def require_index_one(base: SecondOrderModel, geometry: Geometry) -> list[FloatA
         names = tuple(dict.fromkeys(name for place in geometry.places for name in place.dofs))
         msg = (
             f"Two draws of generic slopes of the elements on {listed(names)} give states {listed(kinds[0][1])} and "
-            f"{listed(kinds[1][1])}: the order of the model rests on entries that nearly cancel. Look for them in C and K."
+            f"{listed(kinds[1][1])}: the order of the model rests on entries that nearly cancel. Look for them in C "
+            "and K."
         )
         raise UncertainRankError(msg, dofs=names, gap=1.0)
     return draws[0]
@@ -143,8 +144,9 @@ def _index_error(base: SecondOrderModel, geometry: Geometry, slopes: list[FloatA
     dofs = tuple([dof for dof in base.dofs if dof not in reduction.partition.inertial])
     words = listed([place.words for place in geometry.places])
     msg = (
-        f"The model is of index {reduction.index} whatever the slopes of {words} are: DOFs {listed(dofs)} are tied by a "
-        "rigid constraint or an algebraic loop, and a nonlinear model must be of index 1. Eliminate the constraint, or "
+        f"The model is of index {reduction.index} whatever the slopes of {words} are: DOFs {listed(dofs)} are tied by "
+        "a rigid constraint or an algebraic loop, and a nonlinear model must be of index 1. Eliminate the "
+        "constraint, or "
         "put a stiff spring in its place."
     )
     return LawError(msg, element=words, dofs=dofs)

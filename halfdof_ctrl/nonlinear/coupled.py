@@ -1,12 +1,12 @@
 """Several elements that must be solved for together.
 
-    w + S (f(w) - G w) = w_0,    y = (V' (w - w_0)),    S = V diag(s) V'                           (24)
+    w + S (f(w) - G w) = w_0,    y = (V' (w - w_0)),    S = V diag(s) V'                           (N5)
 
 Where S is symmetric positive semidefinite and every law rises, w = w_0 + V y is where the convex function
 
     h(y) = y' diag(1/s) y / 2 + sum of (F_k(w_k) - G_k w_k^2 / 2),    F_k' = f_k
 
-has its least value: its gradient is (24), its Hessian ``diag(1/s) + V' (D - G) V`` that of springs and dampers in
+has its least value: its gradient is (N5), its Hessian ``diag(1/s) + V' (D - G) V`` that of springs and dampers in
 parallel, so there is one solution at most, and exactly one where the laws are onto. Newton's method with a search
 along each step, whose derivative rises, finds it; where a slope is zero or infinite and Newton stands still, one
 variable after the other is solved for inside its bracket, which lowers h at every turn. Elsewhere damped Newton.
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.nonlinear.geometry import Geometry, Place
 from halfdof_ctrl.nonlinear.scalar_equation import root_of
@@ -29,7 +29,9 @@ RANK = 1e-12  #: singular values of S below this part of the largest are none
 MOST_STEPS = 100  #: of Newton
 MOST_HALVINGS = 60  #: along one step
 MOST_TURNS = 400  #: through all variables, one by one
+LOOSE = 1e3 * EPS  #: of its terms: a gradient that Newton does not make smaller than this is rounding
 SETTLED = 8 * EPS  #: relative change of w that is none
+SHIFTS = (0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-2, 1.0)  #: of the Hessian, in units of its linear part
 STEEPEST = 1e200  #: stands for an infinite slope
 
 Solver = Callable[[float, FloatArray], tuple[FloatArray, FloatArray] | None]
@@ -40,8 +42,8 @@ class Group:
     """The elements of a group, for r variables and a forces of their own."""
 
     places: tuple[Place, ...]
-    rows: FloatArray  #: (r,) places of the variables in w
-    columns: FloatArray  #: (a,) places of the forces in f
+    rows: IndexArray  #: (r,) places of the variables in w
+    columns: IndexArray  #: (a,) places of the forces in f
     S: FloatArray  #: (r, a)
     G: FloatArray  #: (a, r)
 
@@ -82,11 +84,11 @@ class Group:
 
 
 def coupled_solver(group: Group) -> Solver:
-    """Return the function that solves (24) for w and d, given t and w_0; None where it finds no answer."""
+    """Return the function that solves (N5) for w and d, given t and w_0; None where it finds no answer."""
     return _convex_solver(group) if group.is_convex else _plain_solver(group)
 
 
-def _convex_solver(group: Group) -> Solver:
+def _convex_solver(group: Group) -> Solver:  # noqa: C901  # four closures over one group
     s, V = np.linalg.eigh(0.5 * (group.S + group.S.T))
     kept = s > RANK * s.max()
     s, V = s[kept], V[:, kept]
@@ -99,22 +101,21 @@ def _convex_solver(group: Group) -> Solver:
         return y / s + V.T @ beyond, beyond
 
     def newton(t: float, w_0: FloatArray, y: FloatArray) -> tuple[FloatArray, bool]:
-        down, _ = gradient(t, w_0, y)
+        down, beyond = gradient(t, w_0, y)
         for _ in range(MOST_STEPS):
             w = w_0 + V @ y
-            hessian = np.diag(1.0 / s) + V.T @ ((np.diag(group.slope(w, t)) - g)[:, None] * V)
-            try:
-                step = scipy.linalg.solve(hessian, -down, assume_a="sym")
-            except (np.linalg.LinAlgError, ValueError, scipy.linalg.LinAlgWarning):
-                return y, False
-            if not np.isfinite(step).all() or down @ step > 0.0:
-                return y, False
-            y, down = _along(lambda at: gradient(t, w_0, at)[0], y, step, down)
+            if _is_flat(down, y / s, V.T @ beyond, EPS):
+                return y, True
+            step = _newton_step(np.diag(1.0 / s) + V.T @ ((np.diag(group.slope(w, t)) - g)[:, None] * V), down, 1.0 / s)
+            if step is None:
+                break
+            y = _along(lambda at: gradient(t, w_0, at)[0], y, step, down)
+            down, beyond = gradient(t, w_0, y)
             if not np.isfinite(down).all():
                 return y, False
-            if _is_settled(V @ step, w_0 + V @ y):
+            if _is_settled(V @ step, np.concatenate([w, w_0])):
                 return y, True
-        return y, False
+        return y, _is_flat(down, y / s, V.T @ beyond, LOOSE)
 
     def solve(t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         y, settled = newton(t, w_0, np.zeros(s.size))
@@ -129,25 +130,37 @@ def _convex_solver(group: Group) -> Solver:
     return solve
 
 
+def _is_flat(down: FloatArray, one: FloatArray, two: FloatArray, share: float) -> bool:
+    """Tell whether a gradient is no more than this share of its two terms."""
+    return bool((np.abs(down) <= share * (np.abs(one) + np.abs(two))).all())
+
+
+def _newton_step(hessian: FloatArray, down: FloatArray, scale: FloatArray) -> FloatArray | None:
+    """Return a step down; where a slope is zero and the Hessian singular, a shorter one along what is left of it."""
+    for shift in SHIFTS:
+        try:
+            factor = scipy.linalg.cho_factor(hessian + shift * np.diag(scale))
+        except (np.linalg.LinAlgError, ValueError):
+            continue
+        step = -scipy.linalg.cho_solve(factor, down)
+        if np.isfinite(step).all() and down @ step < 0.0:
+            return np.asarray(step)
+    return None
+
+
 def _along(
     gradient: Callable[[FloatArray], FloatArray], y: FloatArray, step: FloatArray, down: FloatArray
-) -> tuple[FloatArray, FloatArray]:
+) -> FloatArray:
     """Go along a step to where the derivative of h has fallen to less than half; it rises along the step."""
     first = float(down @ step)
     low, high, at = 0.0, 1.0, 1.0
     for _ in range(MOST_HALVINGS):
-        here = gradient(y + at * step)
-        derivative = float(here @ step)
-        if np.isfinite(derivative) and abs(derivative) <= 0.5 * abs(first):
-            return y + at * step, here
-        if np.isfinite(derivative) and derivative < 0.0:
-            low = at
-            if at == 1.0:
-                return y + at * step, here
-        else:
-            high = at
+        derivative = float(gradient(y + at * step) @ step)
+        if np.isfinite(derivative) and (abs(derivative) <= 0.5 * abs(first) or (derivative < 0.0 and at == 1.0)):
+            break
+        low, high = (at, high) if np.isfinite(derivative) and derivative < 0.0 else (low, at)
         at = 0.5 * (low + high)
-    return y + at * step, gradient(y + at * step)
+    return y + at * step
 
 
 def _turns(group: Group) -> Callable[[FloatArray, FloatArray], FloatArray | None]:
@@ -205,5 +218,5 @@ def _plain_solver(group: Group) -> Solver:
     return solve
 
 
-def _is_settled(step: FloatArray, w: FloatArray) -> bool:
+def _is_settled(step: np.ndarray, w: np.ndarray) -> bool:
     return bool((np.abs(step) <= SETTLED * np.abs(w).max(initial=0.0)).all())

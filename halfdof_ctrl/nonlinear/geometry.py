@@ -1,6 +1,6 @@
 """Where the elements of a nonlinear model sit: what they depend on and what they act on.
 
-    w = L_q q + L_v q'                                                                             (21)
+    w = L_q q + L_v q'                                                                             (N2)
     M q'' + C q' + K q + E f(w, t) = B u
 
 A spring has one row of L_q, a damper one of L_v, and both the column e of E; a `Force` has a row for each motion that
@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.model.elements import Element, Force, Spring
+from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
 from halfdof_ctrl.model.law import Law
-from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words
+from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words, split_actions
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.judgement import judged
 
@@ -74,15 +74,18 @@ class Geometry:
     E: FloatArray  #: (n, a)
     L_q: FloatArray  #: (r, n)
     L_v: FloatArray  #: (r, n)
+    R: FloatArray  #: (p, a) the forces in the outputs: in the reactions of DOFs whose motion is prescribed
 
     def with_slopes(self, base: SecondOrderModel, slopes: Sequence[FloatArray | None]) -> SecondOrderModel:
         """Return M, C and K with ``E_k G_k L_k`` of every element whose slope G_k is given."""
-        C, K = np.array(base.C), np.array(base.K)
+        C, K, by_q, by_v = (np.array(matrix) for matrix in (base.C, base.K, base.F, base.G))
         for place, G in zip(self.places, slopes, strict=True):
             if G is not None:
                 C += self.E[:, place.forces] @ G @ self.L_v[place.arguments]
                 K += self.E[:, place.forces] @ G @ self.L_q[place.arguments]
-        return replace(base, C=read_only(C), K=read_only(K))
+                by_q += self.R[:, place.forces] @ G @ self.L_q[place.arguments]
+                by_v += self.R[:, place.forces] @ G @ self.L_v[place.arguments]
+        return replace(base, C=read_only(C), K=read_only(K), F=read_only(by_q), G=read_only(by_v))
 
     def forces(self, w: FloatArray, t: float) -> FloatArray:
         """Return all forces f(w, t)."""
@@ -116,7 +119,8 @@ def geometry_of(model: NonlinearModel) -> Geometry:
         else:
             e = direction(element, dofs)
             still = np.zeros((1, n))
-            E, L_q, L_v = e[:, None], *((e[None], still) if isinstance(element, Spring) else (still, e[None]))
+            is_spring = isinstance(element, Spring)
+            E, L_q, L_v = e[:, None], e[None] if is_spring else still, still if is_spring else e[None]
         arguments, forces = slice(r, r + len(L_q)), slice(a, a + E.shape[1])
         place = Place(element=element, words=words, dofs=element_dofs(element), arguments=arguments, forces=forces)
         r, a = arguments.stop, forces.stop
@@ -126,7 +130,8 @@ def geometry_of(model: NonlinearModel) -> Geometry:
     E, L_q, L_v = (
         read_only(join(parts)) for join, parts in ((np.hstack, columns), (np.vstack, by_q), (np.vstack, by_v))
     )
-    return Geometry(places=tuple(places), E=E, L_q=L_q, L_v=L_v)
+    E, R = split_actions(E, model.linear)
+    return Geometry(places=tuple(places), E=E, L_q=L_q, L_v=L_v, R=R)
 
 
 def merged_elements(model: NonlinearModel) -> list[tuple[Element, str]]:
@@ -143,9 +148,9 @@ def merged_elements(model: NonlinearModel) -> list[tuple[Element, str]]:
             found[key] = element, words
             continue
         first, named = found[key]
-        turned = first.a != element.a  # type: ignore[union-attr]  # keys of springs and dampers hold no Force
-        law = side_by_side(first.law, element.law, turned=turned)  # type: ignore[union-attr,arg-type]
-        found[key] = replace(first, law=law), f"{named} and {words}"  # type: ignore[type-var]
+        if isinstance(first, Spring | Damper) and isinstance(first.law, Law):  # keys of these hold nothing else
+            law = side_by_side(first.law, element.law, turned=first.a != element.a)
+            found[key] = type(first)(first.a, first.b, law), f"{named} and {words}"
     return list(found.values())
 
 

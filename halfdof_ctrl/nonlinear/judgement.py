@@ -41,8 +41,7 @@ def judged(law: Law) -> Judgement:
     (-1.0, 1.0)
     """
     if law.written is not None:
-        bounds = (-np.inf, np.inf) if law.bounds is None else law.bounds
-        return Judgement(law.monotone, bounds, law.flat)
+        return Judgement(law.monotone, _beyond_domain(law, law.bounds or (-np.inf, np.inf)), law.flat)
     x = GRID[(law.domain[0] <= GRID) & (law.domain[1] >= GRID)]
     force = np.array([_value(law, float(value)) for value in x])
     known = np.isfinite(force)
@@ -52,11 +51,17 @@ def judged(law: Law) -> Judgement:
     bounds = _reach(law) if law.bounds is None else law.bounds
     unbounded_part = np.abs(force[1:]) < STILL_BELOW * _largest(bounds)  # a law is flat where it has reached its bound
     flat = law.flat or bool(((rise == 0.0) & (np.abs(force[1:]) > 0.0) & unbounded_part).any() or _dead(x, force))
-    return Judgement(law.monotone and bool((rise >= -noise).all()), bounds, flat)
+    return Judgement(law.monotone and bool((rise >= -noise).all()), _beyond_domain(law, bounds), flat)
 
 
 STILL_BELOW = 0.999  #: of a bound: closer to it, equal values say nothing new
 DEAD_ZONE = 1e-6  #: zeros over more than this [m or m/s] around zero are no underflow
+
+
+def _beyond_domain(law: Law, bounds: tuple[float, float]) -> tuple[float, float]:
+    """Call a law unbounded on a side where its domain ends first: a run that gets there is stopped."""
+    low, high = law.domain
+    return (bounds[0] if low == -np.inf else -np.inf, bounds[1] if high == np.inf else np.inf)
 
 
 def _dead(x: np.ndarray, force: np.ndarray) -> bool:

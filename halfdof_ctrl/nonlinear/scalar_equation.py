@@ -54,10 +54,11 @@ def _by_bracket(law: Law, rest: float) -> Root:
         if at_zero == 0.0 or not math.isfinite(at_zero):
             return 0.0 if at_zero == 0.0 else math.nan
         end = highest if at_zero < 0.0 else lowest
-        found = _bracket(lambda w: residual(w, r), at_zero, end, first=abs(at_zero) / _steepness(slope, rest))
-        if found is None:
-            return math.nan
-        return _newton(lambda w: residual(w, r), lambda w: float(slope(w)) + rest, *found)
+        with np.errstate(over="ignore", invalid="ignore"):  # far out, where only signs matter
+            found = _bracket(lambda w: residual(w, r), at_zero, end, first=abs(at_zero) / _steepness(slope, rest))
+            if found is None:
+                return math.nan
+            return _newton(lambda w: residual(w, r), lambda w: float(slope(w)) + rest, *found)
 
     return root
 

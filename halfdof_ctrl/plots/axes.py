@@ -25,6 +25,7 @@ AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
 FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
 LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
 LEGEND_SIZE = 9.0  #: [pt]
+USUAL_POINTS = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
 LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
 CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
 
@@ -127,6 +128,27 @@ def label_y(ax: Axes, text: str) -> None:
     """Label the y axis, but keep a label that says the same and more (the unit, from a model drawn before)."""
     if not ax.get_ylabel().startswith(text):
         ax.set_ylabel(text)
+
+
+def usual_largest(ax: Axes, part: float) -> float:
+    """Return the size that a part of the width of a plot stays below, for all its curves with positive values.
+
+    Points weigh by the width between them, since grids are dense at resonances.
+    """
+    sizes, widths = [], []
+    for line in ax.get_lines():
+        x, y = (np.asarray(data, dtype=float) for data in (line.get_xdata(), line.get_ydata()))
+        places = np.log(x, where=x > 0.0, out=np.full(x.size, np.nan))
+        width = np.abs(np.gradient(places)) if x.size > 1 else np.ones(x.size)
+        sound = np.isfinite(y) & (y > 0.0)
+        sizes.append(y[sound])
+        widths.append(np.nan_to_num(width[sound]))
+    every, weights = np.concatenate(sizes), np.concatenate(widths)
+    order = np.argsort(every)
+    total = np.cumsum(weights[order])
+    if total.size == 0 or total[-1] <= 0.0:
+        return float(every.max(initial=0.0))
+    return float(every[order][np.searchsorted(total, part * total[-1])])
 
 
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:

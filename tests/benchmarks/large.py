@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fe_models import Structure, leading_matrix, space_frame, spring_grid
+from support.fe_models import Structure, leading_matrix, space_frame, spring_grid
 
 MASSES = 50
 PATIENCE = 300.0  #: [s] after which a side counts as endless
@@ -206,8 +206,8 @@ def growth(path: str) -> None:
             structure = spring_grid(side, side, min(MASSES, side**2 // 4), dampers=5)
             names = [f"q{place}" for place in structure.massive[[0, -1]]]
             dense = structure.model().select(f"F_{names[0]}", names).as_dense()
-            note("mech2ss, dense model", structure.size, seconds(lambda dense=dense: hd.mech2ss(dense)))  # type:
-            ignore[misc] if structure.size <= DENSE_SIDES[-3] ** 2:
+            note("mech2ss, dense model", structure.size, seconds(lambda dense=dense: hd.mech2ss(dense)))  # type: ignore[misc]
+            if structure.size <= DENSE_SIDES[-3] ** 2:
                 n = structure.size
                 E = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), dense.M]])
                 A = np.block([[np.zeros((n, n)), np.eye(n)], [-dense.K, -dense.C]])
