@@ -17,6 +17,7 @@ from halfdof_ctrl.base.names import listed, motions
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
+from halfdof_ctrl.files.folders import several_models
 from halfdof_ctrl.files.models import inspect_files, load_model
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
@@ -68,6 +69,9 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 def run_info(arguments: argparse.Namespace) -> int:
     """Print what a model is."""
+    if arguments.model not in BUILT_IN and (several := several_models(Path(arguments.model))):
+        print(several, flush=True)
+        return DONE
     if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
         print(inspect_files(arguments.model), flush=True)
     model = _model(arguments)

