@@ -14,11 +14,13 @@ from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
     InconsistentStateError,
+    LawError,
     LostDigitsWarning,
     MatrixError,
     MissingExtraError,
     ModelSizeError,
     NearlyMasslessWarning,
+    NoAnswerError,
     NoStateSpaceError,
     ParameterError,
     SignalNameError,
@@ -32,6 +34,8 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.files.naming import naming_the_file
 
 EXAMPLES: list[HalfdofError] = [
+    LawError("bounded", element="damper 1 (coulomb)", dofs=("y2",)),
+    NoAnswerError("stops", element="damper 1 (table)", dofs=("y2",), time=0.5, force=7.0, state=(0.0, 1.0)),
     MatrixError("K is empty", matrix="K"),
     ComplexModelError("K is complex", matrices=("K", "C")),
     SignalNameError("no such name", names=("a",)),

@@ -3,10 +3,10 @@
 Let x be the response of the stored system at s, known to the last digit, and q what it says of all DOFs. Had A and B no
 rounding errors, q would satisfy the equation of motion. What is left of that,
 
-    r = B(s) - P(s) q,                                                                     (23)
+    r = B(s) - P(s) q,                                                                     (29)
 
 is a force, and the response to it is what is lost, to first order in the loss: H = F(s) (q + P(s)^-1 r) + D(s), beside
-what C and D say. Both x and the residual (23) are summed in twice the working precision, since what is looked for is
+what C and D say. Both x and the residual (29) are summed in twice the working precision, since what is looked for is
 smaller than the rounding of either; of P(s)^-1 r the first digit counts. Derivation: docs/explanation/evaluation.md.
 """
 
