@@ -18,14 +18,14 @@ from halfdof_ctrl.base.arrays import EPS, checked_matrix
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
-from halfdof_ctrl.files.formats.digits import SINGLE
+from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
 from halfdof_ctrl.files.formats.variables import PLANE, Variable
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
-TEXTS = ("dofs", "inputs", "outputs", "prescribed", "elements")
-ROUNDING = "known_to"  #: variable with the relative rounding of the entries
+TEXT_VARIABLES = ("dofs", "inputs", "outputs", "prescribed", "elements")
+ROUNDING_VARIABLE = "known_to"  #: variable with the relative rounding of the entries
 STATE_SPACE = {"A", "B", "C", "D"}
 OWN_LAYOUT = {"B", "F", "D", "dofs", "inputs", "outputs"}  #: all of which save_model writes
 GUESSES = {
@@ -68,14 +68,14 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         msg = "no stiffness K in the file, which holds a state space A, B, C, D. Read it by load_system."
         raise FileFormatError(msg, path="")
     chosen = _chosen(found, titles)
-    others = [variable for variable in found if variable.name not in (*TEXTS, "name", ROUNDING)]
+    others = [variable for variable in found if variable.name not in (*TEXT_VARIABLES, "name", ROUNDING_VARIABLE)]
     if not set(chosen) & set(SQUARE):
         single = [variable for variable in others if variable.is_matrix]
         if len(single) == 1 and single[0] not in chosen.values():
             chosen = {None: single[0]}
     if not titles:
         _require_matrices(chosen, others)
-    names = {key: named[key].read() for key in (*TEXTS, "name") if key in named}
+    names = {key: named[key].read() for key in (*TEXT_VARIABLES, "name") if key in named}
     dofs = texts(names, "dofs")
     rounding = _rounding(named)
     taken = [id(variable) for variable in chosen.values()]
@@ -174,7 +174,7 @@ def _proposal(found: Sequence[Variable]) -> str:
 
 
 def _rounding(named: Mapping[str, Variable]) -> float:
-    variable = named.get(ROUNDING)
+    variable = named.get(ROUNDING_VARIABLE)
     value = float(np.asarray(variable.read()).item()) if variable is not None and variable.kind == "matrix" else EPS
     return value if EPS <= value < 1.0 else EPS
 
@@ -196,7 +196,7 @@ def _raw(letter: str | None, variable: Variable, dofs: list[str] | None, roundin
         dofs=checked_dofs(dofs, rows) if dofs is not None and is_square and rows == columns else None,
         named=bool(variable.name),
         dense=dense,
-        known_to=SINGLE if single else rounding,
+        known_to=SINGLE_ROUNDING if single else rounding,
     )
 
 

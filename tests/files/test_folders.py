@@ -9,7 +9,7 @@ from halfdof_ctrl import load_model
 from halfdof_ctrl.base.errors import FileFormatError, ParameterError
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.files.folders import models_in
-from halfdof_ctrl.files.foreign import ENDINGS
+from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
 
 K = np.array([[2.0, -1.0], [-1.0, 2.0]])
 
@@ -46,7 +46,7 @@ def test_a_folder_with_one_archive_is_that_model(tmp_path: Path) -> None:
     np.testing.assert_array_equal(load_model(tmp_path).C, K)
 
 
-@pytest.mark.parametrize("ending", sorted(ENDINGS))
+@pytest.mark.parametrize("ending", sorted(FOREIGN_ENDINGS))
 def test_files_that_are_not_read_are_called_by_their_name(tmp_path: Path, ending: str) -> None:
     """With the way to what is read."""
     path = tmp_path / f"job{ending}"
