@@ -95,3 +95,15 @@ def test_what_is_no_path_is_refused(path: object) -> None:
         load_model(path)  # type: ignore[arg-type]
     with pytest.raises(FileFormatError, match="No file is given"):
         load_model({})
+
+
+def test_the_command_takes_what_the_refusal_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """--matrix C=D, and C= for none."""
+    np.savez(tmp_path / "a.npz", K=K, M=K, D=0.1 * K)
+    assert main(["info", str(tmp_path / "a.npz")]) == 2
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C=D"]) == 0
+    assert "4 states" in capsys.readouterr().out
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "D=", "--matrix", "C="]) == 0
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C"]) == 2
+    assert main(["info", "hydromount", "--triangle", "lower"]) == 2
+    assert "is built in" in capsys.readouterr().err
