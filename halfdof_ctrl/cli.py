@@ -31,6 +31,7 @@ from halfdof_ctrl.commands import (
 )
 from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
+from halfdof_ctrl.systems.state_map import KINDS
 
 PROGRAM = "halfdof-ctrl"
 INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
@@ -98,12 +99,14 @@ def _parser() -> argparse.ArgumentParser:
         needed=True,
     )
     add("info", run_info, "print what is in the files, the model, its pencil and its reduction", None)
-    add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
+    ss = add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
+    ss.add_argument("--states", choices=KINDS, default="dofs", help="what the states are (default: dofs)")
     bode = add("bode", run_bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
     bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
     step = add("step", run_step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    step.add_argument("--amplitude", type=float, default=1.0, metavar="A", help="of the step, of a nonlinear model")
     step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
     add("poles", run_poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
     what = "write the dynamic stiffness at a DOF and its loss angle over Hz (png, svg, pdf), or the numbers (csv)"
@@ -151,6 +154,13 @@ def _add_command(
         "--triangle", choices=("lower", "upper"), help="files store this triangle of symmetric matrices"
     )
     parser.add_argument("--remove-fixed", action="store_true", help="take out DOFs whose stiffness is 1e35 or more")
+    parser.add_argument(
+        "--element",
+        action="append",
+        default=[],
+        metavar="'KIND A [B] LAW'",
+        help="spring or damper to add, as 'damper y2 quadratic(1e4,30)'; linear commands take the tangent at rest",
+    )
     parser.set_defaults(inputs=None, outputs=None)
     if signals:
         parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")

@@ -31,6 +31,7 @@ from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
 from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.working_states import working_system
 
 COLUMN_WIDTH = 5.0  #: [in] of a figure with one column on the page, so that its text can be read on a phone
 SHOWN_OUTPUTS, SHOWN_INPUTS = 3, 2  #: what a Bode diagram on a phone can hold
@@ -206,7 +207,7 @@ def _found(model: SecondOrderModel) -> Findings:
         reduction=reduction,
         sys=sys,
         check=check,
-        eigenvalues=eigenvalue_table(model, sys),
+        eigenvalues=eigenvalue_table(model, working_system(model)),
         feedback=feedback,
         regulator=words,
         notes=[],

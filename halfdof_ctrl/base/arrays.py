@@ -1,4 +1,4 @@
-"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparsearrays`)."""
+"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparse_arrays`)."""
 
 from collections.abc import Sequence
 from functools import lru_cache

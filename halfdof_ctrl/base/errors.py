@@ -9,8 +9,6 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-MOST_WORDS = 300  #: characters of another library's error that are passed on
-
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
     """Make an error again on the other side of a process boundary."""
@@ -160,6 +158,42 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class LawError(HalfdofError):
+    """A law that is not linear cannot do what its place in the model asks of it.
+
+    `element` is the element in words, `dofs` are those it acts on.
+    """
+
+    def __init__(self, message: str, *, element: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.element = element
+        self.dofs = dofs
+
+
+class NoAnswerError(LawError):
+    """During a run no motion answers a force, or a law gives NaN or Inf.
+
+    `time` [s] is when, `force` [N] what found no answer (NaN where a law gave NaN), `state` the state reached.
+    """
+
+    def __init__(
+        self, message: str, *, element: str, dofs: tuple[str, ...], time: float, force: float, state: tuple[float, ...]
+    ) -> None:
+        super().__init__(message, element=element, dofs=dofs)
+        self.time = time
+        self.force = force
+        self.state = state
+
+
+class EnergyFormError(HalfdofError):
+    """A model has no energy coordinates; `reason` is one word for why, `dofs` are concerned."""
+
+    def __init__(self, message: str, *, reason: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.dofs = dofs
+
+
 class ModelSizeError(HalfdofError):
     """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
 
@@ -246,6 +280,10 @@ class LostDigitsWarning(HalfdofWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
+class DataLimitWarning(HalfdofWarning):
+    """Entries known to their last digit do not determine a response to more digits than the message says."""
+
+
 class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
@@ -258,5 +296,9 @@ class TruncationWarning(HalfdofWarning):
     """A small model is far from the full one somewhere in the band that matters."""
 
 
+class LostStateWarning(HalfdofWarning):
+    """The tangent of a nonlinear model has another number of states than the model, since a slope is zero there."""
+
+
 class InterruptedResponseWarning(HalfdofWarning):
-    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""
+    """A response was stopped by the user; what it holds is right, but not all that was asked for."""

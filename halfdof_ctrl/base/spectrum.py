@@ -1,6 +1,7 @@
 """Eigenvalues of a state matrix, and how far rounding alone may have moved each of them."""
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgebal
 
@@ -66,6 +67,11 @@ def balanced_states(A: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 def sorted_eigenvalues(values: ComplexArray) -> ComplexArray:
     """Sort by size, conjugate pairs with the positive imaginary part first."""
+    return values[order_by_size(values)]
+
+
+def order_by_size(values: ComplexArray) -> npt.NDArray[np.intp]:
+    """Return the order by size, conjugate pairs with the positive imaginary part first."""
     with np.errstate(divide="ignore"):
         size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return values[np.lexsort((-values.imag, size))]
+    return np.lexsort((-values.imag, size))

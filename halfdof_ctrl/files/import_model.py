@@ -24,7 +24,9 @@ from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.model.law_text import elements_from_stored
 from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
@@ -39,7 +41,7 @@ def import_model(
     triangle: Triangle | None,
     remove_fixed: bool,
     matrices: Mapping[str, str | None] | None,
-) -> SecondOrderModel:
+) -> SecondOrderModel | NonlinearModel:
     """Read a model from files, see `models.load_model`."""
     given = _checked(path, triangle, remove_fixed, matrices)
     found = read_matrices(
@@ -107,7 +109,7 @@ def _checked(
     return {letter: Path(one) for letter, one in path.items()} if isinstance(path, Mapping) else [*map(Path, path)]
 
 
-def _model(found: ImportedModel) -> SecondOrderModel:
+def _model(found: ImportedModel) -> SecondOrderModel | NonlinearModel:
     """Make the model under the names of the files."""
     names: dict[str, Any] = {key: texts(found.texts, key) for key in NAMES}
     names["dofs"] = found.dofs or names["dofs"]
@@ -118,7 +120,9 @@ def _model(found: ImportedModel) -> SecondOrderModel:
         model = mechss(**matrices, **names, name=title)
     else:
         model = _with_prescribed(mechss(**matrices, dofs=names["dofs"], name=title), names, prescribed)
-    return model if found.known_to == EPS else replace(model, known_to=found.known_to)
+    model = model if found.known_to == EPS else replace(model, known_to=found.known_to)
+    elements = texts(found.texts, "elements")
+    return nlmechss(model, elements_from_stored(elements)) if elements else model
 
 
 def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescribed: Sequence[str]) -> SecondOrderModel:

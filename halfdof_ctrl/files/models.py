@@ -2,7 +2,7 @@
 
 | what | endings | content |
 |---|---|---|
-| model | .npz, .mat | M, C, K, B, F, G, H, D (and Bv, ..., prescribed, known_to), dofs, inputs, outputs, name |
+| model | .npz, .mat | M, C, K, B, F, G, H, D (Bv, ..., prescribed, known_to, elements), dofs, inputs, outputs, name |
 | model, read only | .mtx, .matrix, .op4, .pch, .sti, .npy, .csv, ... | what programs write, see `import_model` |
 | state space | .npz, .mat | A, B, C, D, states, inputs, outputs, name, dt (-1: sampled with unknown period) |
 | gain | .npz, .mat, .csv | K, inputs, states |
@@ -13,6 +13,7 @@ name beside the target, which takes the target's place when it is complete.
 """
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -23,18 +24,21 @@ from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_model import Paths, import_model, import_report
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.model.law_text import stored_elements
+from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 
 OPTIONAL_LETTERS = ("Bv", "Ba", "Dv", "Da")  #: written only where they are not zero
 MODEL_NAMES = ("dofs", "inputs", "outputs")
 
 
-def save_model(model: SecondOrderModel, path: PathLike) -> None:
+def save_model(model: SecondOrderModel | NonlinearModel, path: PathLike) -> None:
     """Write a model to a file that `load_model` reads back exactly.
 
     Parameters
     ----------
-    model : SecondOrderModel
+    model : SecondOrderModel or NonlinearModel
+        Laws are kept by name and numbers, in the variable ``elements``.
     path : path-like
         Ends in ``.npz``, or in ``.mat`` for MATLAB (version 5), where ``mechss`` takes the same letters.
 
@@ -42,6 +46,8 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     ------
     FileFormatError
         Another ending, or a name that files cannot keep (control characters).
+    ParameterError
+        An element with a function of the user's own.
     OSError
         The file cannot be written.
 
@@ -53,13 +59,16 @@ def save_model(model: SecondOrderModel, path: PathLike) -> None:
     ...     load_model(f"{folder}/mount.npz").outputs
     ('y', 'y1', 'y2')
     """
+    elements = stored_elements(model.elements) if isinstance(model, NonlinearModel) else ()
+    model = model.linear if isinstance(model, NonlinearModel) else model
     kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or not is_zero(getattr(model, letter))]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}
     if model.known_to > EPS:
         content = {"known_to": np.array(model.known_to), **content}
     names = {key: getattr(model, key) for key in MODEL_NAMES}
-    save_matrices(path, content, names | ({"prescribed": model.prescribed} if model.prescribed else {}), model.name)
+    more = {"prescribed": model.prescribed, "elements": elements}
+    save_matrices(path, content, names | {key: texts for key, texts in more.items() if texts}, model.name)
 
 
 def load_model(
@@ -68,7 +77,7 @@ def load_model(
     triangle: Triangle | None = None,
     remove_fixed: bool = False,
     matrices: Mapping[str, str | None] | None = None,
-) -> SecondOrderModel:
+) -> Any:  # noqa: ANN401  # a union would make every reader of linear models check
     """Read a model from a file, or from the files that a finite-element program wrote.
 
     Parameters
@@ -92,7 +101,7 @@ def load_model(
 
     Returns
     -------
-    SecondOrderModel
+    SecondOrderModel, or NonlinearModel where the file has ``elements`` that `save_model` wrote
         Its DOFs are named by node and component (``n101_u1``) where the files have labels; ``known_to`` is the
         rounding of its entries by the digits of the files.
 

@@ -14,9 +14,7 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
 from halfdof_ctrl.files.folders import all_files
 from halfdof_ctrl.files.foreign import OCTAVE, foreign_kind
-from halfdof_ctrl.files.formats import abaqus, calculix, dmig, output4, table
-from halfdof_ctrl.files.formats import harwell_boeing as harwellboeing
-from halfdof_ctrl.files.formats import matrix_market as matrixmarket
+from halfdof_ctrl.files.formats import abaqus, calculix, dmig, harwell_boeing, matrix_market, output4, table
 from halfdof_ctrl.files.formats.npy import is_npy, is_npz
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, most_rows
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
@@ -250,10 +248,10 @@ def _read(path: Path, content: bytes, room: int, *, is_signal: bool) -> list[Raw
 
 def _read_text(path: Path, content: bytes, room: int, *, is_signal: bool) -> list[RawMatrix]:
     suffix = path.suffix.lower()
-    if matrixmarket.is_matrix_market(content):
-        return [matrixmarket.read_matrix_market(content, room)]
-    if harwellboeing.is_harwell_boeing(content):
-        return [harwellboeing.read_harwell_boeing(content)]
+    if matrix_market.is_matrix_market(content):
+        return [matrix_market.read_matrix_market(content, room)]
+    if harwell_boeing.is_harwell_boeing(content):
+        return [harwell_boeing.read_harwell_boeing(content)]
     foreign = foreign_kind(path, content)
     if foreign is None and suffix in calculix.LETTERS and table.is_table(content):
         return [calculix.read_calculix(content, suffix, room)]
@@ -275,7 +273,7 @@ def _read_labels(path: Path, content: bytes) -> tuple[str, ...]:
     suffix = path.suffix.lower()
     if suffix == calculix.DOFS:
         return calculix.read_dofs(content)
-    return harwellboeing.read_mapping(content) if suffix == ".mapping" else dmig.read_extrn(content)
+    return harwell_boeing.read_mapping(content) if suffix == ".mapping" else dmig.read_extrn(content)
 
 
 def _letter(path: Path, raw: RawMatrix, role: FileRole | None) -> str | None:

@@ -24,7 +24,7 @@ from halfdof_ctrl.files.formats.variables import PLANE, Variable
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
-TEXTS = ("dofs", "inputs", "outputs", "prescribed")
+TEXTS = ("dofs", "inputs", "outputs", "prescribed", "elements")
 ROUNDING = "known_to"  #: variable with the relative rounding of the entries
 STATE_SPACE = {"A", "B", "C", "D"}
 OWN_LAYOUT = {"B", "F", "D", "dofs", "inputs", "outputs"}  #: all of which save_model writes

@@ -26,6 +26,7 @@ from halfdof_ctrl.base.sparse_arrays import (
     unit_like,
     zeros_like,
 )
+from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
 from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
@@ -177,6 +178,17 @@ class SecondOrderModel:
             prescribed=(*self.prescribed, *new.names),
         )
         return model.select(new.inputs, new.outputs)
+
+    def as_descriptor(self) -> DescriptorForm:
+        """Give the model as a descriptor system ``E x' = A x + B u``, ``y = C x + D u`` of first order.
+
+        Returns
+        -------
+        DescriptorForm
+            Named tuple (E, A, B, C, D), sparse if the model is, for other tools that take a singular E (DAE,
+            semistate form). How to hand it on: docs/howto/descriptor-systems.md.
+        """
+        return descriptor_form(self)
 
     def as_dense(self) -> "SecondOrderModel":
         """Return the model with dense matrices: itself if they are.

@@ -86,9 +86,9 @@ def bode_plot(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        The curve is `frequency_response` of the state space, for a model that of `mech2ss` of it. Where a
-        model has none (complex, improper, order uncertain, more than 1000 states of a sparse model) the curve is its
-        descriptor form, and the legend says so.
+        The curve is `frequency_response` of it, for a model in the states that keep most digits. Where a
+        model has no state space (complex, improper, order uncertain, more than 1000 states of a sparse model) the curve
+        is its descriptor form, and the legend says so.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points (two are two points, not limits); also with `Hz`. By default a
         grid around the poles.
@@ -176,15 +176,15 @@ def _curve(
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
-            sys = mech2ss(sysdata)
+            mech2ss(sysdata)
         except NoStateSpaceError as refusal:
             kind = f"descriptor form (no state space: {refusal.why})"
             return descriptor_response(sysdata, omega), kind, reference
+        curve = frequency_response(sysdata, omega)
         if reference is None and not (sysdata.is_sparse and len(sysdata.dofs) > LARGEST_DENSE_COPY):
             reference = sysdata
     else:
-        sys = sysdata
-    curve = frequency_response(sys, omega)
+        curve = frequency_response(sysdata, omega)
     if reference is not None:
         size = (curve.noutputs, curve.ninputs)
         if not isinstance(reference, SecondOrderModel) or reference.D.shape != size:

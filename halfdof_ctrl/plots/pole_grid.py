@@ -17,7 +17,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
 ORIGIN_OF_MAP = 1e-7  #: points below this part of the largest |s| do not decide on that
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
-APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+LABELS_APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
 SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
@@ -60,7 +60,7 @@ def draw_pole_grid(ax: Axes) -> None:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
         inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
         end = inside[-1] if inside.size else last
-        if np.hypot(*(end - last)) < APART or np.hypot(*(end - (0.0, 0.5))) < APART:
+        if np.hypot(*(end - last)) < LABELS_APART or np.hypot(*(end - (0.0, 0.5))) < LABELS_APART:
             continue
         last = end
         _draw_mirrored(ax, ray)
@@ -73,10 +73,10 @@ def draw_pole_grid(ax: Axes) -> None:
         arc = radius * np.exp(1j * angles)
         path = _axes_coordinates(ax, arc.conj())[_inside(ax, arc)]
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-        if length[-1] > APART:
+        if length[-1] > LABELS_APART:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
-            if np.hypot(*(middle - last)) > APART and middle[0] > EDGE:
+            if np.hypot(*(middle - last)) > LABELS_APART and middle[0] > EDGE:
                 ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
                 last = middle
 

@@ -4,7 +4,6 @@ from typing import Any, TypeAlias
 
 import control
 import numpy as np
-import scipy.linalg
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
@@ -17,7 +16,7 @@ from halfdof_ctrl.design.lqr import StateFeedback
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
 from halfdof_ctrl.plots.pole_grid import draw_pole_grid, mark_multiple, set_pole_axes
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.systems.working_states import model_poles
 
 Mark: TypeAlias = tuple[ComplexArray, str, dict[str, Any]]
 
@@ -118,11 +117,10 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
 
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
-        A = exact_reduction(model).A
+        poles = model_poles(model)
     except NoStateSpaceError:
         return []
-    poles = scipy.linalg.eigvals(A) if A.size else NONE
-    return [(np.asarray(poles), f"poles of A{closed}", CROSS)]
+    return [(poles, f"poles of A{closed}", CROSS)]
 
 
 def _zeros_of(sys: control.StateSpace) -> ComplexArray:

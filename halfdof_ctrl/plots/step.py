@@ -26,8 +26,10 @@ from halfdof_ctrl.plots.axes import (
 from halfdof_ctrl.plots.units import Units, known_units, plain, signal_label, signal_names, typeset
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_map import StateMap
+from halfdof_ctrl.systems.state_space import mech2ss, system_of_map
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
+from halfdof_ctrl.systems.working_states import working_map
 
 NAMED_LINES = 8  #: recovered DOFs that the legend names
 MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn
@@ -49,7 +51,8 @@ def step_plot(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        The outputs are `control.step_response` of the state space, for a model of `mech2ss` of it. Below them
+        The outputs are `control.step_response` of the state space, for a model in the states that keep most digits
+        (energy coordinates where it has them, else scaled ones; see `mech2ss`). Below them
         stand the displacements of its half and static DOFs, as `ExactReduction.recover` gives them (with
         orthonormal bases, of every DOF that a half or static coordinate moves); not those of a sparse model with more
         than 200 DOFs.
@@ -90,9 +93,16 @@ def step_plot(
     known = known_units(sysdata, units)
     reduction = exact_reduction(sysdata) if isinstance(sysdata, SecondOrderModel) else None
     sys: Any = sysdata if reduction is None else mech2ss(reduction)
+    states = None if reduction is None else working_map(reduction)
     if reduction is not None and reduction.model.is_sparse and len(reduction.model.dofs) > MOST_RECOVERED:
         reduction = None  # nobody could tell so many curves apart
-    response = control.step_response(sys, _times(sys, reduction, timepts), squeeze=False)
+    if states is not None and states.kind == "energy":
+        sys = system_of_map(states)
+        times = _times(sys, None if reduction is None else states, timepts)
+    else:
+        times = _times(sys, reduction, timepts)
+        sys = sys if states is None else system_of_map(states)
+    response = control.step_response(sys, times, squeeze=False)
     time, outputs = np.asarray(response.time), np.asarray(response.outputs)
     (p, m), panels = outputs.shape[:2], _panels(reduction, known)
     what = f"{p} outputs and {len(panels)} groups of recovered displacements in rows, {m} inputs in columns"
@@ -104,9 +114,10 @@ def step_plot(
             time, outputs[i, j], label=f"{prefix}outputs" if panels or prefix else "_outputs", **style
         )
     if reduction is not None and panels:
-        motion, kinds = reduction.recover(response), reduction.partition.kinds_of(reduction.model.dofs)
+        recovered = (reduction if states is None else states).recover(response)
+        kinds = reduction.partition.kinds_of(reduction.model.dofs)
         for (row, (unit, dofs)), j in product(enumerate(panels.items(), start=p), range(m)):
-            histories = [motion[dof][j] for dof in dofs]
+            histories = [recovered[dof][j] for dof in dofs]
             lines[row, j] += _draw_recovered(axes[row, j], time, histories, {d: kinds[d] for d in dofs}, prefix)
             axes[row, j].set_ylabel((plain(dofs[0]) if len(dofs) == 1 else "displacement") + unit)
     _dress(axes, sys, known, grid=grid)
@@ -114,7 +125,7 @@ def step_plot(
 
 
 def _times(
-    sys: control.StateSpace, reduction: ExactReduction | None, timepts: npt.ArrayLike | None
+    sys: control.StateSpace, reduction: ExactReduction | StateMap | None, timepts: npt.ArrayLike | None
 ) -> FloatArray | float | None:
     """Check the given times, or choose them from the modes seen in the outputs and the recovered DOFs."""
     if timepts is not None and np.ndim(timepts) > 0:

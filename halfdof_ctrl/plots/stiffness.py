@@ -70,8 +70,8 @@ def dynamic_stiffness_plot(
     dof : str or sequence of str
         DOF that is moved, as in `dynamic_stiffness`.
     omega : (k,) array_like, optional
-        Frequencies [rad/s], the very points; also with `Hz`. By default those of `stiffness.motion_frequencies`,
-        the same for all models.
+        Frequencies [rad/s], the very points; also with `Hz`. By default the same for all models, those of
+        `~halfdof_ctrl.systems.stiffness.motion_frequencies`.
     ax : (2,) array_like of Axes, optional
         For the modulus and the loss angle.
     xscale, yscale : {"linear", "log"}

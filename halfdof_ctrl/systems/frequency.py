@@ -19,15 +19,16 @@ from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.working_states import response_of_form, working_form, working_matrix
 
 DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
@@ -71,6 +72,9 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     -----
     InterruptedResponseWarning
         The user stopped it.
+    DataLimitWarning
+        Entries known to their last digit do not determine the response to 1e-6 of its value; the message names the
+        frequency where it is worst.
 
     Examples
     --------
@@ -84,7 +88,7 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     else:
         require_regular(model)
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
-        values = model(1j * frequencies, squeeze=False)
+        values = dense_frequency_response(model, frequencies)
     name = None if model.name is None else control_label(model.name)
     return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
 
@@ -115,7 +119,8 @@ def frequency_response(
     Notes
     -----
     The states are balanced by powers of two and all points are worked side by side on a Hessenberg
-    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`.
+    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`. A model is worked in
+    energy coordinates where it has them, whatever states `mech2ss` gives.
 
     Examples
     --------
@@ -130,14 +135,17 @@ def frequency_response(
             sys = mech2ss(sysdata)
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
+        form = working_form(sysdata, sys.nstates)
     else:
-        sys = sysdata
-    frequencies = checked_frequencies(_system_frequencies(sys) if omega is None else omega)
+        sys, form = sysdata, None
+    if omega is None:
+        omega = _system_frequencies(sys if form is None else energy_state_space(form))
+    frequencies = checked_frequencies(omega)
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    values = state_space_response(A, B, C, D, points)
+    values = state_space_response(A, B, C, D, points) if form is None else response_of_form(form, (A, B, C, D), points)
     return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
 
 
@@ -164,7 +172,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         return default_frequencies(pencil_structure(model).finite_eigenvalues)
     if not has_many_states(model):
         try:
-            poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
+            poles, rounding = eigenvalues_and_rounding(working_matrix(model.select(model.inputs[0])))
             return default_frequencies(poles[np.abs(poles) > rounding])
         except NoStateSpaceError:
             pass

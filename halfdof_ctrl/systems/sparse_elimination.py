@@ -18,7 +18,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Row: TypeAlias = dict[int, complex | ComplexArray]  #: entries of a matrix row by column, one or all points
 
-SPARSE = 20  #: entries per row of the factors up to which all points are worked side by side
+SPARSE_FACTORS = 20  #: entries per row of the factors up to which all points are worked side by side
 FACTORIZED_ALONE_ABOVE = 1e-12  #: componentwise; a point above it is factorized by itself
 
 
@@ -45,7 +45,7 @@ def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: Complex
 
     try:
         factors = splu(shifted(points[points.size // 2]))
-        if factors.nnz <= SPARSE * A.shape[0]:
+        if factors.nnz <= SPARSE_FACTORS * A.shape[0]:
             values = _side_by_side(A, b, c, points, (factors.perm_r, factors.perm_c))
     except RuntimeError:  # a pole: every point is looked at by itself
         pass

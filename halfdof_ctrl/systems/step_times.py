@@ -20,8 +20,8 @@ from halfdof_ctrl.base.spectrum import ROUNDING_OF_A, balanced_states
 SETTLING_TIME_CONSTANTS = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
 MOST_PERIODS = 20  #: of a lightly damped mode; more would fill the picture
 SEEN = 200  #: a mode that settles within this fraction of the horizon is a jump to the eye
-FINE = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
-COARSE = 1.0  #: the same where FINE would take too many points: 6 points a period
+FINE_STEP = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
+COARSEST_STEP = 1.0  #: the same where FINE_STEP would take too many points: 6 points a period
 FEWEST_STEPS = 500
 MOST_TIME_STEPS = 10_000
 NO_SCALE = 1.0  #: [s] horizon of a system whose modes give none: no poles, or integrators alone
@@ -76,9 +76,9 @@ def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray
     with np.errstate(divide="ignore", over="ignore"):
         seen = np.abs(moving[SETTLING_TIME_CONSTANTS / np.abs(moving.real) > end / SEEN])
     fastest = float(seen.max(initial=0.0))
-    if horizon is None and end * fastest > COARSE * MOST_TIME_STEPS:
-        end = COARSE * MOST_TIME_STEPS / fastest
-    steps = int(np.clip(np.ceil(end * fastest / FINE), FEWEST_STEPS, MOST_TIME_STEPS))
+    if horizon is None and end * fastest > COARSEST_STEP * MOST_TIME_STEPS:
+        end = COARSEST_STEP * MOST_TIME_STEPS / fastest
+    steps = int(np.clip(np.ceil(end * fastest / FINE_STEP), FEWEST_STEPS, MOST_TIME_STEPS))
     return np.linspace(0.0, end, steps + 1)
 
 

@@ -154,6 +154,19 @@ def test_ss_and_info_print_what_python_prints(capsys: pytest.CaptureFixture[str]
     assert "ExactReduction by selection: 4 states" in printed
 
 
+def test_states_of_a_printed_state_space_can_be_chosen(capsys: pytest.CaptureFixture[str]) -> None:
+    """--states takes what `mech2ss` takes."""
+    assert main(["ss", "hydromount", "--states", "energy"]) == 0
+    assert str(mech2ss(MOUNT, states="energy")) in capsys.readouterr().out
+
+
+def test_info_counts_free_motions(capsys: pytest.CaptureFixture[str]) -> None:
+    """Two masses that nothing ties to the ground: one motion, two poles at 0."""
+    save_model(mechss(np.eye(2), None, [[1, -1], [-1, 1]]), "free.npz")
+    assert main(["info", "free.npz"]) == 0
+    assert "Free motions: 1, 2 poles at exactly 0" in capsys.readouterr().out
+
+
 def test_info_says_why_a_model_has_no_state_space(capsys: pytest.CaptureFixture[str]) -> None:
     """To learn that is what info is for."""
     save_model(mechss([[1.0]], None, [[1.0 + 0.1j]]), "model.npz")

@@ -14,7 +14,7 @@ LAST_DIGITS = 1e-13  #: what is computed twice in the same way; processors diffe
 
 
 def test_pole_map_shows_poles_eigenvalues_and_zeros() -> None:
-    """Crosses are eig(A), circles the finite eigenvalues of the pencil, diamonds `zeros` of the model."""
+    """Crosses are the poles of the state space, circles the finite eigenvalues of the pencil, diamonds `zeros`."""
     cplt = pole_map_plot(mount())
     lines = cplt.lines[0, 0]
     poles = marked(lines, "poles of A")

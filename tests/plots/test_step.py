@@ -11,18 +11,19 @@ from halfdof_ctrl.plots import step_plot
 from halfdof_ctrl.systems.step_times import step_times
 from support.figures import curve_of, legend_texts, mount, stiff
 
-LAST_DIGITS = 1e-13  #: what is computed twice in the same way; processors differ in the last digits
+OTHER_STATES = 1e-11  #: of the largest value: rounding of 2000 steps in energy coordinates and in DOF states
 
 
 def test_step_curves_are_the_step_response() -> None:
-    """Each output's line is `control.step_response` at the plotted times."""
+    """Each output's line is `control.step_response` at the plotted times, here in other states."""
     model = hydromount().select(outputs=["y", "y_ddot"])
     cplt = step_plot(model)
     time, _ = curve_of(cplt.lines[0, 0])
     exact = control.step_response(mech2ss(model), time)
     for i, j in np.ndindex(2, 3):
         assert_array_equal(curve_of(cplt.lines[i, j])[0], time)
-        assert_allclose(curve_of(cplt.lines[i, j])[1], exact.outputs[i, j], rtol=LAST_DIGITS)
+        size = np.abs(exact.outputs[i, j]).max()
+        assert_allclose(curve_of(cplt.lines[i, j])[1], exact.outputs[i, j], rtol=0, atol=OTHER_STATES * size)
 
 
 def test_step_recovers_the_half_dofs_of_the_mount() -> None:
@@ -32,8 +33,9 @@ def test_step_recovers_the_half_dofs_of_the_mount() -> None:
     motion = exact_reduction(mount()).recover(control.step_response(mech2ss(mount()), time, squeeze=False))
     lines = cplt.lines[1, 0]
     assert [line.get_label() for line in lines] == ["y1 (half DOF)", "y2 (half DOF)"]
-    assert_allclose(curve_of(lines, 0)[1], motion["y1"][0], rtol=LAST_DIGITS)
-    assert_allclose(curve_of(lines, 1)[1], motion["y2"][0], rtol=LAST_DIGITS)
+    for k, dof in enumerate(("y1", "y2")):
+        size = np.abs(motion[dof]).max()
+        assert_allclose(curve_of(lines, k)[1], motion[dof][0], rtol=0, atol=OTHER_STATES * size)
     assert_allclose(curve_of(lines, 1)[1][-1], 500.0 / (5500.0 * 1000.0 - 500.0**2), rtol=1e-4)
     assert cplt.axes[1, 0].get_ylabel() == "displacement [m]"
 

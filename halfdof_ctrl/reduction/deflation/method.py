@@ -86,9 +86,9 @@ class Deflation:
         grown = output_signal(probe, result.equations, lambda: result.rounding)
         return len(without_rounding(probe, grown, result.rounding).U)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return output_signal(self.model, self.equations, lambda: self.rounding)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, lambda: self.rounding)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs."""

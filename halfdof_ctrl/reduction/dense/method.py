@@ -81,9 +81,9 @@ class SingleSolve:
         """Return 1 where there are static coordinates, else 0."""
         return int(self.coordinates.n_static > 0)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return output_signal(self.model, self.equations, self._rounding)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, self._rounding)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs."""

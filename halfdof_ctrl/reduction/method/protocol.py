@@ -83,8 +83,8 @@ class ReductionMethod(Protocol):
     def index(self) -> int:
         """Return the index of the pencil (8)."""
 
-    def output(self) -> Signal:
-        """Return the model's outputs as functions of state, inputs and derivatives of inputs."""
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone, as functions of state, inputs and derivatives."""
 
     def motion(self, derivative: int) -> Signal:
         """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""

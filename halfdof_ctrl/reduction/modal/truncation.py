@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.errors import (
@@ -36,7 +37,7 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
-from halfdof_ctrl.reduction.modal.projection import projected
+from halfdof_ctrl.reduction.modal.projection import LOST, projected
 
 POINTS = 12  #: frequencies at which the error is measured, besides resonances
 RESONANCES = 6  #: lowest resonances of the small model at which the error is measured
@@ -94,8 +95,9 @@ def truncate_modes(
     Parameters
     ----------
     model : SecondOrderModel
-        Real, sparse or dense, with symmetric M and K that are positive semidefinite. Choose its inputs and outputs
-        before, with `select`: their DOFs are kept.
+        Sparse or dense, with symmetric M and K that are positive semidefinite. K may be complex (structural
+        damping): the modes are those of its real part, and the small model's K is complex too. Choose its inputs and
+        outputs before, with `select`: their DOFs are kept.
     f_max : float, optional
         Highest frequency that matters [Hz]. The modes up to twice this frequency are kept, found with the kept DOFs
         held.
@@ -115,7 +117,7 @@ def truncate_modes(
     ParameterError
         Not exactly one of `f_max` and `n_modes`, one that is not positive, or no convergence of the Lanczos iteration.
     ComplexModelError
-        The model has structural damping.
+        Another matrix than K has imaginary parts.
     MatrixError
         M or K is not symmetric.
     ModelSizeError
@@ -150,6 +152,8 @@ def truncate_modes(
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     parts = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    if model.is_complex:  # modes are those of the real part; both are projected on them
+        parts |= {"K": csc_array(parts["K"].real), LOST: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
     top = _band_top(parts, motions.omega, f_max)
     small = projected(model, parts, motions, 2.0 * np.pi * top)
@@ -172,12 +176,13 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
 
 
 def _require_symmetric(model: SecondOrderModel) -> None:
-    if model.is_complex:
+    others = tuple([letter for letter in model.complex_matrices if letter != "K"])
+    if others:
         msg = (
-            f"{listed(model.complex_matrices)} has imaginary parts (structural damping): its modes are not those of M "
-            "and K, and no real small model has them. descriptor_response computes such a model as it is."
+            f"{listed(others)} has imaginary parts, and a truncation keeps those of K alone (structural damping). "
+            "descriptor_response computes such a model as it is."
         )
-        raise ComplexModelError(msg, matrices=model.complex_matrices)
+        raise ComplexModelError(msg, matrices=others)
     for letter in "MK":
         asymmetry = is_unsymmetric(as_sparse(getattr(model, letter)))
         if asymmetry:
@@ -271,11 +276,11 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
 
 def _resonances(small: SecondOrderModel, low: float, top: float) -> FloatArray:
     """Return the lowest resonances in the band [Hz], of a model with damping."""
-    if not small.C.any():
+    if not (small.C.any() or small.is_complex):
         return np.zeros(0)
-    size = np.diagonal(small.K) + (2.0 * np.pi * top) ** 2 * np.diagonal(small.M)
+    size = np.diagonal(small.K).real + (2.0 * np.pi * top) ** 2 * np.diagonal(small.M)
     scale = np.sqrt(np.where(size > 0.0, size, 1.0))
-    K, M = (part / scale / scale[:, None] for part in (small.K, small.M))
+    K, M = (part / scale / scale[:, None] for part in (small.K.real, small.M))
     with np.errstate(divide="ignore", invalid="ignore"):
         alpha, beta = scipy.linalg.eig(K, M, right=False, homogeneous_eigvals=True)
         frequencies = np.sqrt(np.abs(alpha / beta)) / (2.0 * np.pi)

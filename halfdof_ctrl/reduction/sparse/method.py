@@ -75,9 +75,9 @@ class SparseSolve:
         """Return 1 where there are static coordinates, else 0."""
         return int(self.coordinates.n_static > 0)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return self.displacement.output(self.model)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return self.displacement.output(model)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs, where that is no matrix too large."""
