@@ -194,6 +194,12 @@ def test_options_mean_the_same_for_every_kind_of_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(model.B, np.eye(2))
 
 
+def test_numbers_called_like_names_are_left_alone(tmp_path: Path) -> None:
+    """A finite-element program in MATLAB has tables of elements, fixed DOFs, counts."""
+    tables = {"elements": np.ones((7, 2)), "dofs": np.arange(6.0), "inputs": 3.0, "outputs": {"a": 1.0}, "name": 5.0}
+    assert is_the_model(load_model(written(tmp_path / "a.mat", {**MODEL, **tables})))
+
+
 def test_a_state_space_is_called_one(tmp_path: Path) -> None:
     """Its C is no damping."""
     np.savez(tmp_path / "a.npz", A=np.eye(2), B=np.eye(2), C=np.eye(2), D=np.eye(2))
