@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import load_model
-from halfdof_ctrl.base.errors import FileFormatError, ParameterError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, ParameterError
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.files.folders import models_in
 from halfdof_ctrl.files.foreign import ENDINGS
@@ -107,3 +107,11 @@ def test_the_command_takes_what_the_refusal_says(tmp_path: Path, capsys: pytest.
     assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C"]) == 2
     assert main(["info", "hydromount", "--triangle", "lower"]) == 2
     assert "is built in" in capsys.readouterr().err
+
+
+def test_notes_about_damping_are_no_damping(tmp_path: Path) -> None:
+    """Beside matrices in a folder."""
+    table(tmp_path, "K.txt", "M.txt")
+    (tmp_path / "damping.txt").write_text("The damping was not measured.\n")
+    with pytest.warns(ImportedModelWarning, match=r"no damping C in K\.txt, M\.txt"):
+        load_model(tmp_path)
