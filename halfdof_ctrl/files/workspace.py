@@ -20,7 +20,7 @@ from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
 from halfdof_ctrl.files.formats.digits import SINGLE
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
-from halfdof_ctrl.files.formats.variables import PLANE, Variable
+from halfdof_ctrl.files.formats.variables import PLANE, Variable, another_kind
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
@@ -64,6 +64,9 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         The file is damaged, or what is called M, C or K is no matrix.
     """
     found = variables(content, is_archive=is_archive)
+    if len(found) == 1 and not found[0].name and found[0].kind != "matrix":  # of a .npy file, there is nothing else
+        found[0].read()
+        raise another_kind("it")
     named = {variable.name: variable for variable in found}
     if set(named) >= STATE_SPACE and not titles and not {"K", "M"} & set(named):
         msg = "no stiffness K in the file, which holds a state space A, B, C, D. Read it by load_system."
@@ -71,7 +74,9 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
     chosen = _chosen(found, titles)
     others = [variable for variable in found if variable.name not in (*TEXTS, "name", ROUNDING) or variable.is_matrix]
     if not set(chosen) & set(SQUARE):
-        single = [variable for variable in others if variable.is_matrix]
+        single = [variable for variable in others if variable.is_matrix] or [
+            variable for variable in others if variable.kind == "matrix" and len(variable.shape) == PLANE
+        ]
         if len(single) == 1 and single[0] not in chosen.values():
             chosen = {None: single[0]}
     if not titles:
