@@ -6,6 +6,7 @@ from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.errors import HalfdofError
 from halfdof_ctrl.files.models import inspect_files, load_model, save_model
+from halfdof_ctrl.files.read_tables import load_response
 from halfdof_ctrl.files.systems import load_system, save_system
 from halfdof_ctrl.files.tables import save_response
 from halfdof_ctrl.model.descriptor_form import DescriptorForm
@@ -47,7 +48,13 @@ from halfdof_ctrl.systems.descriptor_systems import dss2ss
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
 from halfdof_ctrl.systems.state_map import StateMap, state_map
 from halfdof_ctrl.systems.state_space import mech2ss
-from halfdof_ctrl.systems.stiffness import dynamic_stiffness, transmissibility
+from halfdof_ctrl.systems.stiffness import (
+    dynamic_stiffness,
+    dynamic_stiffness_response,
+    transmissibility,
+    transmissibility_response,
+)
+from halfdof_ctrl.systems.time_response import forced_response, initial_response, step_response
 
 __version__ = "0.1.0"
 
@@ -83,18 +90,22 @@ __all__ = [
     "dss2ss",
     "dynamic_stiffness",
     "dynamic_stiffness_plot",
+    "dynamic_stiffness_response",
     "exact_reduction",
     "fit_prony",
+    "forced_response",
     "frequency_response",
     "generalized_maxwell",
     "hydraulic_mount",
     "hydromount",
     "hydromount_part",
     "inerter",
+    "initial_response",
     "inspect_files",
     "kelvin_voigt",
     "laws",
     "load_model",
+    "load_response",
     "load_system",
     "lqr",
     "maxwell",
@@ -114,10 +125,12 @@ __all__ = [
     "save_system",
     "state_map",
     "step_plot",
+    "step_response",
     "sweep",
     "sweep_plot",
     "transmissibility",
     "transmissibility_plot",
+    "transmissibility_response",
     "truncate_modes",
     "with_maxwell_damping",
     "with_modal_damping",

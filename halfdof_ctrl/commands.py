@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeAlias, TypedDict, overload
 
-import control
 import numpy as np
 
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, LostStateWarning, ParameterError
@@ -48,6 +47,7 @@ from halfdof_ctrl.systems.frequency import (
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.time_response import step_response
 from halfdof_ctrl.systems.working_states import working_system
 
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
@@ -156,10 +156,7 @@ def run_step(arguments: argparse.Namespace) -> int:
         return _nonlinear_step(given, arguments, kind)
     model = given
     if kind in TABLE_ENDINGS:
-        recovered = _with_recovered(model)
-        system = working_system(recovered)
-        times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
-        save_response(control.step_response(system, times, squeeze=False), arguments.o)
+        save_response(step_response(_with_recovered(model), arguments.time), arguments.o)
     else:
         save_figure(step_plot(model, arguments.time, title=model.name), arguments.o)
     return DONE

@@ -284,6 +284,10 @@ class DataLimitWarning(HalfdofWarning):
     """Entries known to their last digit do not determine a response to more digits than the message says."""
 
 
+class InaccurateGainWarning(HalfdofWarning):
+    """A gain is optimal to fewer digits than usual, since rounding of the problem moves it."""
+
+
 class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 

@@ -98,6 +98,10 @@ class Deflation:
         """Return a derivative of all DOFs for given states and inputs."""
         return self.equations.motion_at(x, inputs, derivative)
 
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions about blocks of J, equation (16)."""
         return self.evidence.decisions

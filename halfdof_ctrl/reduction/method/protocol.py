@@ -95,6 +95,9 @@ class ReductionMethod(Protocol):
         Derivatives that are missing at the end count as zero.
         """
 
+    def without_rounding(self) -> FloatArray:
+        """Return A with zeros for entries that may be rounding of zero."""
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the singular values that decisions about ranks rest on, those of W last."""
 

@@ -22,7 +22,9 @@ SPECK = 1e-8  #: of the largest entry of a combination without mass, in scaled c
 FIRST = 1e3  #: weight by which kept DOFs are preferred as those that stay static
 
 
-def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: float) -> SecondOrderModel:
+def projected(
+    model: SecondOrderModel, parts: Parts, motions: Motions, omega: float
+) -> tuple[SecondOrderModel, FloatArray]:
     """Project a model on r motions, q = shapes p: a dense model of r DOFs.
 
     Parameters
@@ -37,9 +39,11 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
 
     Returns
     -------
-    SecondOrderModel
+    small : SecondOrderModel
         Kept DOFs have their names, modes are called ``mode1, ...``, corrections ``correction1, ...``; a kept DOF of
         which only a combination with others has mass is called ``<dof>~``.
+    basis : (n, r) ndarray
+        The motion that each of its DOFs is.
     """
     kept, count = motions.kept.size, motions.omega.size
     M, C, K = (_between(motions.shapes, parts[letter]) for letter in "MCK")
@@ -56,7 +60,7 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
         signals |= {letter: turn.T @ signals[letter] for letter in ("B", "Bv", "Ba")}
         signals |= {letter: signals[letter] @ turn for letter in ("F", "G", "H")}
     signals |= {letter: parts[letter].toarray() for letter in ("D", "Dv", "Da")}
-    return mechss(
+    small = mechss(
         M,
         C,
         K if lost is None else K + 0.5j * (lost + lost.T),
@@ -66,6 +70,7 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
         inputs=model.inputs,
         outputs=model.outputs,
     )
+    return small, motions.shapes if turn is None else motions.shapes @ turn
 
 
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:

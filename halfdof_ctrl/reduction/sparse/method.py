@@ -90,6 +90,10 @@ class SparseSolve:
         """Return a derivative of all DOFs for given states and inputs."""
         return self.displacement.motion_at(x, inputs, derivative)
 
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates."""
         return self.coordinates.evidence
