@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl import mechss
-from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding
 from halfdof_ctrl.descriptor.regularity import require_regular
 from support import exact
