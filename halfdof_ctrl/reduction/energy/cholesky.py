@@ -42,6 +42,8 @@ def corrected_factor(K: FloatArray) -> FloatArray | None:
     diagonal = np.diagonal(K)
     if not (diagonal > 0.0).all():
         return None
+    if np.count_nonzero(K) == len(K):
+        return np.diag(np.sqrt(diagonal))
     scale = powers_of_two(np.sqrt(diagonal))
     scaled = scale[:, None] * K * scale
     U, failed = dpotrf(scaled, lower=0, clean=1)
