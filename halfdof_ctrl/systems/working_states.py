@@ -2,7 +2,7 @@
 
 Energy coordinates lose a square root of what displacements and velocities lose, but their output matrix is dense: where
 an output is many decades below the state, as in deep roll-off, terms cancel that DOF states do not have. So a frequency
-response comes of energy coordinates, but of DOF states where less than `SHARE` of the state is left of the output.
+response comes of energy coordinates, but of DOF states where less than `LEAST_SHARE` of the state is left of an output.
 Models without energy coordinates (unsymmetric or indefinite M or K, constraints, masses or dampers that need rotated
 coordinates) are worked in DOF states, scaled by powers of two.
 """
@@ -20,7 +20,7 @@ from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 
-SHARE = 1e-6  #: of |C_i| |x|: what less of an output is left, keeps fewer than ten digits in energy coordinates
+LEAST_SHARE = 1e-6  #: of |C_i| |x|: what less of an output is left, keeps fewer than ten digits in energy coordinates
 
 
 def working_map(reduction: ExactReduction) -> StateMap | None:
@@ -110,10 +110,10 @@ def response_of_form(
     output = form.output
     share = np.ones((len(output.X), form.B.shape[1], points.size))
     values = state_space_response(form.A, form.B, output.X, output.direct(form.B.shape[1]), points, share=share)
-    small = (share < SHARE).any(axis=(0, 1))
+    small = (share < LEAST_SHARE).any(axis=(0, 1))
     if small.any():
         keeping = state_space_response(*dofs, points[small])
-        values[:, :, small] = np.where(share[:, :, small] < SHARE, keeping, values[:, :, small])
+        values[:, :, small] = np.where(share[:, :, small] < LEAST_SHARE, keeping, values[:, :, small])
     return values
 
 
