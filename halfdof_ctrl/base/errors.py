@@ -158,6 +158,33 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class LawError(HalfdofError):
+    """A law that is not linear cannot do what its place in the model asks of it.
+
+    `element` is the element in words, `dofs` are those it acts on.
+    """
+
+    def __init__(self, message: str, *, element: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.element = element
+        self.dofs = dofs
+
+
+class NoAnswerError(LawError):
+    """During a run no motion answers a force, or a law gives NaN or Inf.
+
+    `time` [s] is when, `force` [N] what found no answer (NaN where a law gave NaN), `state` the state reached.
+    """
+
+    def __init__(
+        self, message: str, *, element: str, dofs: tuple[str, ...], time: float, force: float, state: tuple[float, ...]
+    ) -> None:
+        super().__init__(message, element=element, dofs=dofs)
+        self.time = time
+        self.force = force
+        self.state = state
+
+
 class EnergyFormError(HalfdofError):
     """A model has no energy coordinates; `reason` is one word for why, `dofs` are concerned."""
 
@@ -257,6 +284,10 @@ class DataLimitWarning(HalfdofWarning):
     """Entries known to their last digit do not determine a response to more digits than the message says."""
 
 
+class InaccurateGainWarning(HalfdofWarning):
+    """A gain is optimal to fewer digits than usual, since rounding of the problem moves it."""
+
+
 class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
@@ -269,5 +300,9 @@ class TruncationWarning(HalfdofWarning):
     """A small model is far from the full one somewhere in the band that matters."""
 
 
+class LostStateWarning(HalfdofWarning):
+    """The tangent of a nonlinear model has another number of states than the model, since a slope is zero there."""
+
+
 class InterruptedResponseWarning(HalfdofWarning):
-    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""
+    """A response was stopped by the user; what it holds is right, but not all that was asked for."""

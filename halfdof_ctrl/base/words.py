@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 FIXED = (1e-2, 1e6)  #: sizes that four decimals show well
+NOTHING = 1e-13  #: of the size: a part below this is rounding, and written as zero
 
 
 def complex_in_words(value: complex, *, pair: bool = False) -> str:
@@ -19,13 +20,21 @@ def complex_in_words(value: complex, *, pair: bool = False) -> str:
 
 
 def eigenvalue_in_words(value: complex, *, pair: bool = False) -> str:
-    """Write an eigenvalue with four decimals, so that those below each other can be compared.
+    """Write an eigenvalue with four decimals, so that those below each other can be compared, each part for itself.
 
     >>> eigenvalue_in_words(-0.5 + 2j, pair=True)
     '-0.5000 ± 2.0000j'
+    >>> eigenvalue_in_words(-1.5e-5 + 200j, pair=True)
+    '-1.5000e-05 ± 200.0000j'
     """
-    kind = "f" if FIXED[0] <= abs(value) < FIXED[1] or value == 0 else "e"
-    return _written(value, lambda part: f"{part:.4{kind}}", pair=pair)
+
+    def number(part: float) -> str:
+        shown = part if abs(part) > NOTHING * abs(value) else 0.0
+        size = abs(shown or value)  # a zero is written like the part beside it
+        kind = "f" if FIXED[0] <= size < FIXED[1] or size == 0.0 else "e"
+        return f"{shown:.4{kind}}"
+
+    return _written(value, number, pair=pair)
 
 
 def _written(value: complex, number: Callable[[float], str], *, pair: bool) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 
 BALANCING_SWEEPS = 10  #: equilibration passes over rows and columns
-SHIFT = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
+FREE_FACTOR = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
 
 
 def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -29,7 +29,7 @@ def balancing_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
     logs = np.log2(np.where(size > 0.0, size, 1.0))
     normal = np.block([[np.diag(present.sum(axis=1)), present], [present.T, np.diag(present.sum(axis=0))]])
     right = -np.concatenate([logs.sum(axis=1), logs.sum(axis=0)])
-    means = np.exp2(np.linalg.solve(normal + SHIFT * np.eye(len(normal)), right))
+    means = np.exp2(np.linalg.solve(normal + FREE_FACTOR * np.eye(len(normal)), right))
     return _with_maxima_near_one(size, means[: size.shape[0]], means[size.shape[0] :])
 
 

@@ -11,12 +11,12 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import DataLimitWarning, callers_level
-from halfdof_ctrl.model.evaluation import SUSPECT, data_limit, transfer_and_growth
-from halfdof_ctrl.model.refinement import DataLimit
+from halfdof_ctrl.model.evaluation import data_limit, transfer_and_growth
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 WARNED = 1e-6  #: part of the value from which (DATA) is told
-SHIFT = 1e-9  #: relative change of frequency that nobody notices: what it changes beside a pole or a zero is no loss
+SMALL_SHIFT = 1e-9  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
 
 
 def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -> ComplexArray:
@@ -35,7 +35,7 @@ def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -
         (model.D, model.Dv, model.Da),
     )
     values, growth = transfer_and_growth(*coefficients, points)
-    suspect = np.flatnonzero((growth > SUSPECT) & np.isfinite(growth))
+    suspect = np.flatnonzero((growth > SUSPECT_GROWTH) & np.isfinite(growth))
     if suspect.size:
         limit = data_limit(*coefficients, points[suspect])
         warn_of_data(model, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)
@@ -60,17 +60,19 @@ def warn_of_data(
     """
     size = np.abs(values)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        share = np.where((size > 0.0) & np.isfinite(size) & (limit.data > SHIFT * limit.slope), limit.data / size, 0.0)
+        told = (size > 0.0) & np.isfinite(size) & (limit.data > SMALL_SHIFT * limit.slope)
+        share = np.where(told, limit.data / size, 0.0)
     if not share.size or not share.max() > WARNED:
         return
     i, j, k = np.unravel_index(int(np.argmax(share)), share.shape)
     worst, count = float(share[i, j, k]), int(np.count_nonzero((share > WARNED).any(axis=(0, 1))))
     digits = f"to {worst:.1e} of its value" if worst < 1.0 else "not at all"
+    channel = f"{model.outputs[i]} to {model.inputs[j]}"
     msg = (
-        f"Entries of M, C, K known to their last digit (2.2e-16) determine the response of {model.outputs[i]} to "
-        f"{model.inputs[j]} at {frequencies[k]:.4g} rad/s {digits} ((DATA), an upper bound; above 1e-6 at {count} "
-        f"of {asked} frequencies). Small masses or springs were lost beside stiff ones when entries were rounded, and "
-        "every solver that sees these numbers errs alike. Solutions are refined for the numbers as stored; for "
-        "more digits use fewer elements, or take out what is stiff as a rigid connection."
+        f"Entries of M, C, K known to their last digit (2.2e-16) determine the response of {channel} at "
+        f"{frequencies[k]:.4g} rad/s {digits} ((DATA), an upper bound; above 1e-6 at {count} of {asked} frequencies). "
+        "Small masses or springs were lost beside stiff ones when the entries were rounded, and every solver that sees "
+        "these numbers errs alike. Solutions are refined for the numbers as they are stored; for more digits use fewer "
+        "elements, or take out what is stiff as a rigid connection."
     )
     warnings.warn(msg, DataLimitWarning, stacklevel=callers_level())

@@ -16,7 +16,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import ComplexArray, Matrix
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT, Evidence, Pencil, deflated, deflated_once
 
-GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where a rank is looked at that holds almost everywhere
+GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: of a mean frequency: ranks there hold almost everywhere
 CLEAR_MARGIN = 1000.0  #: a rank decision with less than this margin is looked at twice
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
@@ -26,6 +26,7 @@ class FoundStructure:
     doubts: tuple[str, ...]
 
 
+@np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
 def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
     """Find counts, eigenvalues and doubts of a square matrix polynomial, of 1, s, s^2."""
     if not coefficients[0].size:
@@ -63,8 +64,8 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
 def nearly_singular(share: float) -> str:
     """Say that a model is regular by no more than rounding."""
     return (
-        f"the stored numbers are regular, but changes of {np.finfo(float).eps / share:.1e} of each entry can make "
-        f"det P(s) vanish identically, and rounding is {np.finfo(float).eps:.1e}"
+        f"the stored numbers are regular, but changes of {EPS / share:.1e} of each entry can make "
+        f"det P(s) vanish identically, and rounding is {EPS:.1e}"
     )
 
 

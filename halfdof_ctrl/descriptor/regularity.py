@@ -13,8 +13,9 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.exact_counts import normal_rank
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
 from halfdof_ctrl.descriptor.first_order import typical_frequency
-from halfdof_ctrl.descriptor.nearness import GENERIC_POINTS, UNDECIDED, share_of_rounding, undecided_regularity
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding, undecided_regularity
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE, causes, null_spaces, singular_pencil_error
 from halfdof_ctrl.model.sparse_evaluation import PointFactors, SparsePencil

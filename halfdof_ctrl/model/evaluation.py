@@ -18,13 +18,12 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powe
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
-from halfdof_ctrl.model.refinement import DataLimit, random_right_side, refined
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, random_right_side, refined
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
-SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
 
 
 def quadratic_transfer(
@@ -68,7 +67,7 @@ def transfer_and_growth(
         with np.errstate(invalid="ignore", over="ignore"):
             right = _polynomial(B, part)
             states, growth[start : start + batch] = _solved(_polynomial(P, part), right)
-            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT).tolist():
+            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT_GROWTH).tolist():
                 exact = ExactPolynomial(P) if exact is None else exact
                 states[k] = _refined(P, exact, complex(part[k]), states[k], right[k])
             response = _polynomial(F, part) @ states + _polynomial(D, part)

@@ -26,13 +26,12 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_e
 from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.model.refinement import DataLimit, refined
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
-SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
 STRICTER_PIVOTS_ABOVE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
 
@@ -127,7 +126,7 @@ class SparseTransfer:
         growth = factors.growth()
         self.growth = max(self.growth, growth)
         left = None
-        if growth > SUSPECT:
+        if growth > SUSPECT_GROWTH:
             self.exact = ExactPolynomial(self.square) if self.exact is None else self.exact
             left = factors.solve_transposed(F[:MOST_BOUNDED].toarray().T)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)

@@ -130,6 +130,27 @@ def label_y(ax: Axes, text: str) -> None:
         ax.set_ylabel(text)
 
 
+def usual_largest(ax: Axes, part: float) -> float:
+    """Return the size that a part of the width of a plot stays below, for all its curves with positive values.
+
+    Points weigh by the width between them, since grids are dense at resonances.
+    """
+    sizes, widths = [], []
+    for line in ax.get_lines():
+        x, y = (np.asarray(data, dtype=float) for data in (line.get_xdata(), line.get_ydata()))
+        places = np.log(x, where=x > 0.0, out=np.full(x.size, np.nan))
+        width = np.abs(np.gradient(places)) if x.size > 1 else np.ones(x.size)
+        sound = np.isfinite(y) & (y > 0.0)
+        sizes.append(y[sound])
+        widths.append(np.nan_to_num(width[sound]))
+    every, weights = np.concatenate(sizes), np.concatenate(widths)
+    order = np.argsort(every)
+    total = np.cumsum(weights[order])
+    if total.size == 0 or total[-1] <= 0.0:
+        return float(every.max(initial=0.0))
+    return float(every[order][np.searchsorted(total, part * total[-1])])
+
+
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
     """Draw light grid lines, or none."""
     style: dict[str, Any] = {"color": "0.85", "linewidth": 0.7} if on else {}  # matplotlib draws what has a style

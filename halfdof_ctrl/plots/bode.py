@@ -19,7 +19,6 @@ from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     CIRCLE,
-    USUAL_POINTS,
     AxesArray,
     AxesLike,
     draw_grid,
@@ -29,10 +28,16 @@ from halfdof_ctrl.plots.axes import (
     no_lines,
     prepared_axes,
     require_system,
+    usual_largest,
 )
-from halfdof_ctrl.plots.phase import continuous_phase, on_branch
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
-from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response, has_many_states
+from halfdof_ctrl.systems.frequency import (
+    descriptor_response,
+    frequency_response,
+    has_many_states,
+)
+from halfdof_ctrl.systems.phase import response_phase
+from halfdof_ctrl.systems.sampled_phase import on_branch
 from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
@@ -40,6 +45,7 @@ PEAK_MARKS = 6  #: markers on the highest peaks besides
 ONE_MARKER = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
+USUAL_WIDTH = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
 FLAT_RATIO = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
 FLAT_ROOM = 5.0  #: ... and gets this factor above and below
 RESONANCE_SPIKE = 1e5  #: a peak higher than this times that range is cut
@@ -129,8 +135,8 @@ def bode_plot(
 
     Notes
     -----
-    The phase starts between -180 and 180 degrees and has no jumps; across an undamped pole it falls and
-    across an undamped zero it rises, as with vanishing damping.
+    The phase is on the branch that poles and zeros of the model give, on any grid: across an undamped pole it falls
+    and across an undamped zero it rises, as with vanishing damping. See `systems.phase`.
 
     Examples
     --------
@@ -145,7 +151,7 @@ def bode_plot(
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     lines, scales, prefix = no_lines(axes), Scales(dB, Hz, deg), legend_prefix(label)
-    values, marks = np.asarray(curve.frdata), _marked(curve)
+    values, marks, phases = np.asarray(curve.frdata), _marked(curve), response_phase(curve)
     exact = (
         None
         if reference is None or marks.size == 0
@@ -153,7 +159,7 @@ def bode_plot(
     )
     for i, j in product(range(p), range(m)):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
-        phase = continuous_phase(values[i, j])
+        phase = phases[i, j]
         x = scales.frequency(curve.omega)
         style: dict[str, Any] = {"label": prefix + kind, "linewidth": 1.5}
         lines[2 * i, j] += above.plot(x, scales.magnitude(values[i, j]), **style)
@@ -257,7 +263,7 @@ def _set_logarithmic(ax: Axes) -> None:
     if curve.max() <= FLAT_RATIO * curve.min():
         ax.set_ylim(curve.min() / FLAT_ROOM, curve.max() * FLAT_ROOM)
     ax.set_yscale("log")
-    usual = float(np.percentile(curve, USUAL_POINTS))
+    usual = usual_largest(ax, USUAL_WIDTH)
     if ax.dataLim.y1 > RESONANCE_SPIKE * usual:
         ax.set_ylim(top=np.sqrt(RESONANCE_SPIKE) * usual)
 

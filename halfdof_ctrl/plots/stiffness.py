@@ -14,7 +14,6 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
-    USUAL_POINTS,
     AxesArray,
     AxesLike,
     draw_grid,
@@ -22,9 +21,10 @@ from halfdof_ctrl.plots.axes import (
     label_y,
     no_lines,
     prepared_axes,
+    usual_largest,
 )
-from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
+from halfdof_ctrl.systems.phase import response_phase
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
     dynamic_stiffness_response,
@@ -40,8 +40,9 @@ SCALES: tuple[Scale, ...] = get_args(Scale)
 ANGLE_STEPS = {
     True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0),
     False: (1.0, 2.0, 5.0, 10.0),
-}  #: of ticks, wide or not
+}  #: of ticks, by WIDE_ANGLES or not
 WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
+USUAL_WIDTH = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
 STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
 ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
 CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
@@ -172,7 +173,8 @@ def transmissibility_plot(
     models, texts = _models(sysdata, label)
     _require_scales(xscale, yscale)
     if omega is None:
-        omega = motion_frequencies(models, from_ if kind == "motion" else to, linear=xscale == "linear")
+        held, other = (from_, to) if kind == "motion" else (to, from_)
+        omega = motion_frequencies(models, held, other=other, linear=xscale == "linear")
     responses = [transmissibility_response(model, from_, to, omega, kind=kind) for model in models]
     causes, results = as_tuple(from_), as_tuple(to)
     unit = _ratio_unit(models[0], units, results, causes)
@@ -237,7 +239,7 @@ def _draw(
         omega, values = np.asarray(response.omega, dtype=float), np.asarray(response.frdata)[0, 0]
         x = omega / (2.0 * np.pi) if Hz else omega
         lines[0, 0] += axes[0, 0].plot(x, np.abs(values), label=text, linewidth=1.5)
-        lines[1, 0] += axes[1, 0].plot(x, np.degrees(continuous_phase(values)), label=text, linewidth=1.5)
+        lines[1, 0] += axes[1, 0].plot(x, np.degrees(response_phase(response)[0, 0]), label=text, linewidth=1.5)
     return lines
 
 
@@ -278,7 +280,7 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = float(np.percentile(curve, USUAL_POINTS))
+    usual = usual_largest(ax, USUAL_WIDTH)
     if curve.max() - curve.min() <= CONSTANT_SPAN * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
     elif curve.max() > STIFFNESS_SPIKE[scale] * usual:

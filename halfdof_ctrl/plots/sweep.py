@@ -15,12 +15,12 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_legend, draw_title, no_lines, prepared_axes
 from halfdof_ctrl.plots.bode import Scales, dress_bode
 from halfdof_ctrl.plots.branches import followed
-from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.plots.pole_grid import set_pole_axes
 from halfdof_ctrl.plots.pole_map import draw_plane
 from halfdof_ctrl.plots.sweep_colours import CaseColours, Numbers, coloured_cases
 from halfdof_ctrl.plots.units import Units, known_units
 from halfdof_ctrl.sweeps.result import SweepResult
+from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 Kind: TypeAlias = Literal["bode", "poles"]
 

@@ -108,7 +108,7 @@ class ExactReduction:
     @property
     def output(self) -> Signal:
         """The model's outputs as functions of state, inputs and, where they are improper, derivatives of inputs."""
-        return self.solution.output()
+        return self.solution.output(self.model)
 
     @property
     def polynomial_part(self) -> tuple[FloatArray, ...]:

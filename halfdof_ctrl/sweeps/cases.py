@@ -25,6 +25,9 @@ Parameters: TypeAlias = Mapping[str, object] | Sequence[Mapping[str, object]] | 
 
 CASE = "case"  #: name of the axis of a list or sample
 
+SHORT = 7  #: characters of a number that is written as it is
+FOUR_DIGITS, TEN_DIGITS = 1e4, 1e10  #: sizes between which four digits would need a power of ten
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Cases:
@@ -122,8 +125,20 @@ def in_words(parameters: Mapping[str, object]) -> str:
 
 
 def in_short(value: object) -> str:
-    """Write a value, a number with four digits."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Write a value, a number in full where that is short or before the point, else with four digits.
+
+    >>> in_short(150001.0), in_short(0.125), in_short(1 / 3)
+    ('150001', '0.125', '0.3333')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    text = in_full(value)
+    return text if len(text) <= SHORT or FOUR_DIGITS <= abs(value) < TEN_DIGITS else f"{value:.4g}"
+
+
+def in_full(value: object) -> str:
+    """Write a value with the digits that tell it from others."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def _grid(varied: dict[str, Values], fixed: dict[str, object]) -> Cases:

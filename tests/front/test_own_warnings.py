@@ -66,7 +66,7 @@ def test_the_command_shows_the_packages_own_warnings_only(
 
 
 def test_a_spring_without_mass_is_reported_without_a_word_on_stderr(tmp_path: Path) -> None:
-    """A system without states makes python-control do what NumPy 2.5 deprecates."""
+    """Without states, python-control does what NumPy 2.5 deprecates, and only python-control can cure that."""
     save_model(mechss([[0]], [[0]], [[2]]), tmp_path / "model.npz")
     command = [*COMMAND, "report", "model.npz", "-o", "report"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=120)

@@ -6,7 +6,13 @@ import pytest
 from halfdof_ctrl.errors import LostDigitsWarning
 from support.warned import raised_in
 
-OURS = ["halfdof_ctrl", "halfdof_ctrl.plots.bode", "test_reduction", "support.structures", "multiprocessing.context"]
+OURS = [
+    "halfdof_ctrl",
+    "halfdof_ctrl.plots.bode",
+    "tests.front.test_cli",
+    "support.structures",
+    "multiprocessing.context",
+]
 THEIRS = ["control", "control.statesp", "numpy.linalg", "scipy.sparse._construct"]
 DEPRECATIONS = [
     DeprecationWarning,

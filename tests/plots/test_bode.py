@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.plots import bode_plot
-from halfdof_ctrl.plots.phase import continuous_phase
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+from halfdof_ctrl.systems.sampled_phase import continuous_phase
 from support.figures import OMEGA, curve_of, legend_texts, mount
 
 LAST_DIGITS = 1e-13  #: what is computed twice in the same way; processors differ in the last digits

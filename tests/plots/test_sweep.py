@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import SecondOrderModel, SweepResult, hydromount, mech2ss, mechss, sweep, sweep_plot
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.plots.phase import continuous_phase
+from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 OMEGA = np.geomspace(1.0, 50.0, 9)
 LAST_DIGITS = 1e-13  #: what is computed twice in the same way; processors differ in the last digits of other strides

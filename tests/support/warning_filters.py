@@ -16,6 +16,7 @@ from importlib.metadata import packages_distributions
 import pytest
 
 PACKAGE = "halfdof_ctrl"
+OURS = {PACKAGE, "tests", "support"}  #: some distributions install their tests under these names too
 DEPRECATIONS = (
     "DeprecationWarning",
     "PendingDeprecationWarning",
@@ -26,7 +27,7 @@ DEPRECATIONS = (
 
 def pytest_configure(config: pytest.Config) -> None:
     """Name the packages that are installed here; later filters go before earlier ones."""
-    others = "|".join(re.escape(name) for name in sorted(packages_distributions()) if name != PACKAGE)
+    others = "|".join(re.escape(name) for name in sorted(packages_distributions()) if name not in OURS)
     for category in DEPRECATIONS:
         config.addinivalue_line("filterwarnings", rf"ignore::{category}:({others})(\.|$)")
     config.addinivalue_line("filterwarnings", f"error::{PACKAGE}.base.errors.HalfdofWarning")

@@ -21,8 +21,9 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import WORD, ansys_name
-from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
+from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled, most_rows
 from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, LONGEST_LINE, Lines, fixed_width, printable, whole_numbers
 
 TYPE_LETTERS = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
@@ -96,6 +97,7 @@ def read_harwell_boeing(content: bytes) -> RawMatrix:
         title=header.title,
         letter=letter,
         notes=notes,
+        known_to=known_to(content),
     )
 
 
@@ -141,7 +143,7 @@ def _header(lines: Lines, length: int) -> _Header:
     rows, columns, entries = _numbers(lines[2][3:], 3, 3)[:3]
     right_hand_sides = cards[4] if len(cards) > HEADER_LINES else 0
     first = HEADER_LINES + (right_hand_sides > 0)
-    if max(rows, columns) > max(MOST_ROWS, length) or first + sum(cards[1:4]) > len(lines):
+    if max(rows, columns) > most_rows(length) or first + sum(cards[1:4]) > len(lines):
         msg = (
             f"it says {rows} x {columns} with {sum(cards[1:4])} lines of data, but has {len(lines)} lines. It is "
             "damaged or cut short."

@@ -23,6 +23,7 @@ from scipy.sparse.linalg import LinearOperator, onenormest, splu
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, column_of_entries, largest_by_row_and_column
 from halfdof_ctrl.base.sparse_products import exact_residual, times
+from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
@@ -35,7 +36,7 @@ SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a 
 SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
 DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
-CHEAP = 1000  #: ... of a matrix of up to so many rows
+CHEAP = 200  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
@@ -57,14 +58,20 @@ class SparseLU:
     def factorized(cls, matrix: SparseMatrix) -> "SparseLU":
         """Equilibrate, factorize and estimate the condition.
 
-        Even maxima may leave a matrix badly scaled still: one that looks singular, or ill conditioned if it is small,
-        is scaled by the means of the logarithms of its entries, which does not depend on units, and judged again.
+        Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
+        logarithms of its entries, which does not depend on units, and judged again; a small one that looks ill
+        conditioned is scaled as the dense leading matrix is.
         """
         first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
-        if not first.is_singular and (first.rcond >= DOUBTFUL or matrix.shape[0] > CHEAP):
+        if matrix.shape[0] <= CHEAP and first.rcond < DOUBTFUL:
+            best = LeadingMatrix.factorized(matrix.toarray())
+            if best.rows is not None and best.columns is not None:
+                return _better(first, cls._scaled(matrix, best.rows, best.columns))
+        if not first.is_singular:
             return first
-        second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
-        return second if second.rcond > first.rcond else first
+        return _better(
+            first, cls._scaled(matrix, *[np.exp2(np.round(log)) for log in evening_logs(matrix, settled=SETTLED)])
+        )
 
     @classmethod
     def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
@@ -119,6 +126,10 @@ class SparseLU:
         rest = exact_residual(self.scaled, right, solution, transposed=transposed == "N")
         correction = self.factors.solve(rest, trans=transposed)
         return np.asarray(solution + correction.astype(np.longdouble if transposed == "N" else float))
+
+
+def _better(one: SparseLU, other: SparseLU) -> SparseLU:
+    return other if other.rcond > one.rcond else one
 
 
 def largest_of_columns(matrix: FloatArray) -> FloatArray:

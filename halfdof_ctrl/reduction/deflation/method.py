@@ -86,9 +86,9 @@ class Deflation:
         grown = output_signal(probe, result.equations, lambda: result.rounding)
         return len(without_rounding(probe, grown, result.rounding).U)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return output_signal(self.model, self.equations, lambda: self.rounding)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, lambda: self.rounding)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs."""
@@ -97,6 +97,10 @@ class Deflation:
     def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
         """Return a derivative of all DOFs for given states and inputs."""
         return self.equations.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
 
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions about blocks of J, equation (16)."""

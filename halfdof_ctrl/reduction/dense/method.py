@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -24,6 +24,7 @@ from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquatio
 
 NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
+ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LOST = 1e-9  #: by the rounding of A and B at most, from which on other coordinates are tried ...
@@ -81,9 +82,9 @@ class SingleSolve:
         """Return 1 where there are static coordinates, else 0."""
         return int(self.coordinates.n_static > 0)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return output_signal(self.model, self.equations, self._rounding)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, self._rounding)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs."""
@@ -92,6 +93,22 @@ class SingleSolve:
     def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
         """Return a derivative of all DOFs for given states and inputs."""
         return self.equations.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A with zeros for entries that may be rounding of zero.
+
+        An entry of the solution ``W^-1 R`` of (3) is known to ``u |W^-1| (|W| |W^-1| |R| + |R|)`` times a small number.
+        """
+        model, part = self.model, self.coordinates
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        size = np.abs(leading_columns(model, part))
+        inverse = np.abs(self.leading.solve(np.eye(len(size))))
+        right = np.abs(np.hstack([part.times_basis(model.K, 0, moving), part.times_basis(model.C, 0, n_i)]))
+        doubt = ENTRY_ROUNDING * (inverse @ (size @ (inverse @ right) + right))
+        A = self.A.copy()
+        rows = np.vstack([doubt[n_i:moving], doubt[:n_i]])
+        A[n_i:][np.abs(A[n_i:]) <= rows] = 0.0
+        return A
 
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates and the singular values of W."""

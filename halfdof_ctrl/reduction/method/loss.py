@@ -3,10 +3,10 @@
 Let x be the response of the stored system at s, known to the last digit, and q what it says of all DOFs. Had A and B no
 rounding errors, q would satisfy the equation of motion. What is left of that,
 
-    r = B(s) - P(s) q,                                                                     (23)
+    r = B(s) - P(s) q,                                                                     (29)
 
 is a force, and the response to it is what is lost, to first order in the loss: H = F(s) (q + P(s)^-1 r) + D(s), beside
-what C and D say. Both x and the residual (23) are summed in twice the working precision, since what is looked for is
+what C and D say. Both x and the residual (29) are summed in twice the working precision, since what is looked for is
 smaller than the rounding of either; of P(s)^-1 r the first digit counts. Derivation: docs/explanation/evaluation.md.
 """
 
@@ -64,8 +64,8 @@ class Stored(Protocol):
     def B(self) -> FloatArray:  # noqa: N802
         """(N, m) input matrix."""
 
-    def output(self) -> Signal:
-        """Return the outputs."""
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
 
     def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
         """Return all DOFs, (n, k), for states (N, k) and inputs and their derivatives (m, k)."""
@@ -78,7 +78,7 @@ def measured_loss(stored: Stored) -> Loss:
     """Measure what A, B, C, D lose, relative to each channel's largest value at the frequencies that are looked at."""
     m = stored.B.shape[1]
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
-    equation, output = equation_of_motion(stored.model), stored.output()
+    equation, output = equation_of_motion(stored.model), stored.output(stored.model)
     points, lost, values, undetermined = [], [], [], []
     for s in loss_points(stored.A):
         try:

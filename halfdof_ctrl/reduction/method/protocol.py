@@ -83,8 +83,8 @@ class ReductionMethod(Protocol):
     def index(self) -> int:
         """Return the index of the pencil (8)."""
 
-    def output(self) -> Signal:
-        """Return the model's outputs as functions of state, inputs and derivatives of inputs."""
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone, as functions of state, inputs and derivatives."""
 
     def motion(self, derivative: int) -> Signal:
         """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
@@ -94,6 +94,9 @@ class ReductionMethod(Protocol):
 
         Derivatives that are missing at the end count as zero.
         """
+
+    def without_rounding(self) -> FloatArray:
+        """Return A with zeros for entries that may be rounding of zero."""
 
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the singular values that decisions about ranks rest on, those of W last."""

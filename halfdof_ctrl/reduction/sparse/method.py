@@ -75,9 +75,9 @@ class SparseSolve:
         """Return 1 where there are static coordinates, else 0."""
         return int(self.coordinates.n_static > 0)
 
-    def output(self) -> Signal:
-        """Return the outputs."""
-        return self.displacement.output(self.model)
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return self.displacement.output(model)
 
     def motion(self, derivative: int) -> Signal:
         """Return a derivative of all DOFs, where that is no matrix too large."""
@@ -89,6 +89,10 @@ class SparseSolve:
     def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
         """Return a derivative of all DOFs for given states and inputs."""
         return self.displacement.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
 
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates."""
