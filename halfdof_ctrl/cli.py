@@ -14,7 +14,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning
+from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning, own_messages, recording_warnings
 from halfdof_ctrl.commands import (
     BUILT_IN,
     REFUSED,
@@ -67,13 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
-    """Show each warning once, as a line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    """Show each of the package's warnings once, as a line."""
+    with recording_warnings() as caught:
         try:
             yield caught
         finally:
-            for message in dict.fromkeys(str(warning.message) for warning in caught):
+            for message in own_messages(caught):
                 _say("warning", message)
 
 
@@ -107,6 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
     bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
     step = add("step", run_step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    step.add_argument("--amplitude", type=float, default=1.0, metavar="A", help="of the step, of a nonlinear model")
     step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
     add("poles", run_poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
     what = "write the dynamic stiffness at a DOF and its loss angle over Hz (png, svg, pdf), or the numbers (csv)"
@@ -148,6 +148,13 @@ def _add_command(
         help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
     )
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
+    parser.add_argument(
+        "--element",
+        action="append",
+        default=[],
+        metavar="'KIND A [B] LAW'",
+        help="spring or damper to add, as 'damper y2 quadratic(1e4,30)'; linear commands take the tangent at rest",
+    )
     parser.set_defaults(inputs=None, outputs=None)
     if signals:
         parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")

@@ -5,22 +5,27 @@ import functools
 import inspect
 import math
 import os
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeAlias, overload
 
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, ParameterError
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, LostStateWarning, ParameterError
 from halfdof_ctrl.base.names import listed, motions
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
+from halfdof_ctrl.files.folders import several_models
 from halfdof_ctrl.files.models import inspect_files, load_model
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
 from halfdof_ctrl.files.writing import replacing
+from halfdof_ctrl.model.law_text import element_from_text
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.nonlinear.response import nonlinear_response
 from halfdof_ctrl.parts.mounts import hydromount
 from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
 from halfdof_ctrl.plots.figure_files import save_figure
@@ -39,6 +44,7 @@ from halfdof_ctrl.systems.frequency import (
     model_frequencies,
 )
 from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
 from halfdof_ctrl.systems.time_response import step_response
 from halfdof_ctrl.systems.working_states import working_system
@@ -69,9 +75,16 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 def run_info(arguments: argparse.Namespace) -> int:
     """Print what a model is."""
+    if arguments.model not in BUILT_IN and (several := several_models(Path(arguments.model))):
+        print(several, flush=True)
+        return DONE
     if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
         print(inspect_files(arguments.model), flush=True)
-    model = _model(arguments)
+    given = _given_model(arguments)
+    if isinstance(given, NonlinearModel):
+        print(given)
+        return DONE
+    model = given
     print(model)
     if len(model.dofs) > LARGEST_PENCIL:
         if not model.is_sparse:
@@ -137,7 +150,10 @@ def run_stiffness(arguments: argparse.Namespace) -> int:
 def run_step(arguments: argparse.Namespace) -> int:
     """Draw or tabulate the step response."""
     kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
-    model = _model(arguments)
+    given = _given_model(arguments)
+    if isinstance(given, NonlinearModel):
+        return _nonlinear_step(given, arguments, kind)
+    model = given
     if kind in TABLE_ENDINGS:
         save_response(step_response(_with_recovered(model), arguments.time), arguments.o)
     else:
@@ -183,10 +199,33 @@ def run_check(arguments: argparse.Namespace) -> int:
     return DONE if check.passed else CHECK_FAILED
 
 
+def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: str | None) -> int:
+    """Tabulate the response to a step of one input: there is no superposition of several."""
+    if kind not in TABLE_ENDINGS:
+        msg = "The step response of a nonlinear model is written as numbers: give -o FILE.csv."
+        raise ParameterError(msg, parameter="-o", value=arguments.o)
+    if len(model.inputs) != 1:
+        msg = f"A nonlinear model takes a step of one input; choose it by --inputs: {listed(model.inputs)}."
+        raise ParameterError(msg, parameter="--inputs", value=model.inputs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LostStateWarning)  # of the tangent that only says how long to look
+        system = mech2ss(model.tangent())
+    times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
+    save_response(nonlinear_response(model, times, arguments.amplitude), arguments.o)
+    return DONE
+
+
 def _model(arguments: argparse.Namespace) -> SecondOrderModel:
-    """Make the built-in model or load the file, and select its signals."""
+    """Return the model of a command that works on linear ones: of a nonlinear one, the tangent at rest."""
+    model = _given_model(arguments)
+    return model.tangent() if isinstance(model, NonlinearModel) else model
+
+
+def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearModel:
+    """Make the built-in model or load the file, add elements, and select its signals."""
     name: str = arguments.model
     signals: _Signals | None = None
+    model: SecondOrderModel | NonlinearModel
     if name in BUILT_IN:
         signals = BUILT_IN_SIGNALS[name]
         model = BUILT_IN[name](**_parameters(name, arguments.p))
@@ -198,6 +237,10 @@ def _model(arguments: argparse.Namespace) -> SecondOrderModel:
             msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
             raise FileFormatError(msg, path=name)
         model = load_model(name)
+    elements = [element_from_text(text) for text in arguments.element]
+    if elements:
+        known = model.elements if isinstance(model, NonlinearModel) else ()
+        model = nlmechss(model.linear if isinstance(model, NonlinearModel) else model, [*known, *elements])
     inputs, outputs = signals or (None, None)
     return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import control
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError, own_messages, recording_warnings
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -24,7 +24,7 @@ from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.writing import naming_target
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.page import MARK, Findings, PageFigure, page
+from halfdof_ctrl.page import PAGE_MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
 from halfdof_ctrl.plots.figure_files import close_figure, save_figure
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -89,15 +89,14 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with recording_warnings() as caught:
         findings = _found(model)
         shown, cut = _shown(model)
         plots = _plots(model, shown, findings.feedback)
     said = {str(warning.message): warning for warning in caught}
     for warning in said.values():
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    findings.notes.extend([*said, *cut])
+    findings.notes.extend([*own_messages(caught), *cut])
     build = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
     with naming_target(folder):
         build.mkdir()
@@ -282,7 +281,7 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
 
 def _require_own_folder(target: Path, given: PathLike) -> None:
     index = target / INDEX
-    foreign = index.exists() and not (index.is_file() and MARK in index.read_text("utf-8", errors="replace"))
+    foreign = index.exists() and not (index.is_file() and PAGE_MARK in index.read_text("utf-8", errors="replace"))
     if foreign or (target.exists() and not target.is_dir()):
         msg = f"{given}: there is something of that name that is no report. Choose another folder."
         raise FileFormatError(msg, path=str(given))

@@ -1,4 +1,4 @@
-"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparsearrays`)."""
+"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparse_arrays`)."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -10,7 +10,7 @@ from scipy.sparse import issparse
 
 from halfdof_ctrl.base.errors import MatrixError
 
-EPS = float(np.finfo(float).eps)
+EPS = float(np.finfo(float).eps)  #: spacing of floating-point numbers at one
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
@@ -19,7 +19,7 @@ DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expand
 LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense for what works on dense matrices alone
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
-PLAIN = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
+PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -83,7 +83,7 @@ def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matr
     MatrixError
         As in `checked_matrix`, or all are None.
     """
-    if all([type(value) in PLAIN for value in values]):  # noqa: C419  # a list is faster for three
+    if all([type(value) in PLAIN_TYPES for value in values]):  # noqa: C419  # a list is faster for three
         together = _stacked(values)
         if together is not None:
             return together

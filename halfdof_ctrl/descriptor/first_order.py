@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray, Matrix
 from halfdof_ctrl.descriptor.balancing import balancing_powers, equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import connected_parts
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
@@ -61,9 +61,9 @@ def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
 def _factors_of_part(part: Matrix) -> tuple[Matrix, Matrix]:
     down, across = equilibrating_powers(np.abs(part))
     left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(part.shape) * values[0]))
+    rank = int(np.count_nonzero(values > ZERO_PIVOT * max(part.shape) * values[0]))
     left, right = left[:, :rank], right[:rank]
-    speck = max(part.shape) * np.finfo(float).eps * values[0] / values[rank - 1]
+    speck = max(part.shape) * EPS * values[0] / values[rank - 1]
     left, right = (np.where(np.abs(vectors) <= speck, 0.0, vectors) for vectors in (left, right))
     return left * values[:rank] / down[:, None], right / across
 

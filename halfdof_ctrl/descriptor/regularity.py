@@ -3,28 +3,26 @@
 from typing import Any, cast
 
 import numpy as np
-import scipy.linalg
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import SingularPencilError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.exact_counts import normal_rank
 from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
 from halfdof_ctrl.descriptor.first_order import typical_frequency
-from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding, undecided_regularity
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
-from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
+from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE, causes, null_spaces, singular_pencil_error
+from halfdof_ctrl.model.sparse_evaluation import PointFactors, SparsePencil
 
-SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero
-NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
+SINGULAR_PENCIL = 64 * EPS  #: of the largest singular value: a smallest one below is rounding of zero
+PENCIL_NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
 STEPS = 4  #: of inverse iteration
-NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 
 
 @limited_threads(1)
@@ -40,7 +38,7 @@ def require_regular_sparse(model: SecondOrderModel) -> None:
     gamma, pencil = _time_scale(coefficients), SparsePencil.on_one_pattern(coefficients)
     for point in GENERIC_POINTS:
         ratio, null = _smallest_singular_value(pencil, gamma * point)
-        if ratio > SINGULAR:
+        if ratio > SINGULAR_PENCIL:
             return
     dofs = tuple([model.dofs[k] for k in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
     msg = (
@@ -60,7 +58,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
         matrix, lu, known = factors.matrix, cast("Any", factors.lu), 1.0
     except RuntimeError:  # exactly singular
         matrix, _, _ = pencil.equilibrated_at(s)
-        nudge = diags_array(NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
+        nudge = diags_array(PENCIL_NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
         lu, known = splu(csc_array(matrix + nudge)), 0.0
     generator = np.random.default_rng(0)
     vector = generator.standard_normal(matrix.shape[0]) + 1j * generator.standard_normal(matrix.shape[0])
@@ -90,36 +88,26 @@ def require_regular(model: SecondOrderModel) -> None:
     Raises
     ------
     SingularPencilError
-        ``P(s)`` is singular to working precision at three generic points.
+        ``det P(s)`` of the stored numbers vanishes at every s, exactly.
+    UncertainRankError
+        It does not, but changes of the size of rounding could make it vanish.
     """
     if model.is_sparse:
         require_regular_sparse(model)
         return
-    gamma = typical_frequency(model)
-    P = model.K
-    for point in GENERIC_POINTS:
-        s = gamma * point
-        P = model.K + s * model.C + s**2 * model.M
-        if not _is_singular(P):
-            return
-    null = null_spaces(P)
-    n = len(model.dofs)
+    coefficients = (model.K, model.C, model.M)
+    share = share_of_rounding(coefficients)
+    if share <= UNDECIDED:
+        return
+    n, rank = len(model.dofs), normal_rank(coefficients)
+    s = typical_frequency(model) * GENERIC_POINTS[0]
+    null = null_spaces(model.K + s * model.C + s**2 * model.M)
+    dofs = [model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))]
+    if rank == n:
+        raise undecided_regularity(share, dofs)
     raise singular_pencil_error(
-        dofs=[model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))],
+        dofs=dofs,
         equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
-        fact=f"its rank is {n - null.dimension} of {n}, smallest singular value {null.smallest:.1e} of the largest",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
+        fact=f"its rank is {rank} of {n}",
+        causes=causes(null, coefficients, model.dofs),
     )
-
-
-def _is_singular(P: Matrix) -> bool:
-    """Return whether an irreducible diagonal block of a square matrix is singular to working precision."""
-    for rows, columns in diagonal_blocks(P != 0.0):
-        if rows.size != columns.size:
-            return True
-        block = P[np.ix_(rows, columns)]
-        down, across = equilibrating_powers(np.abs(block))
-        values = scipy.linalg.svdvals(block * down[:, None] * across)
-        if values[-1] <= RANK_TOLERANCE * values.size * values[0]:
-            return True
-    return False

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import Places, diagonal_blocks
 
-EPS = float(np.finfo(float).eps)
-RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
-NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
+ZERO_PIVOT = 64 * EPS  #: times the size: pivots below this part of the largest are zero
+ROUNDING_NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,7 +139,7 @@ def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, Evidence]:
         return np.eye(matrix.shape[0]), 0, Evidence()
     left, triangle, _ = scipy.linalg.qr(matrix, pivoting=True)
     pivots = np.abs(np.diagonal(triangle))
-    level = max(RANK_TOLERANCE * max(matrix.shape) * pivots[0], NOISE * np.sqrt(squares.max()))
+    level = max(ZERO_PIVOT * max(matrix.shape) * pivots[0], ROUNDING_NOISE * np.sqrt(squares.max()))
     rank = int(np.count_nonzero(pivots > level))
     if rank == 0:
         return left, 0, Evidence()
@@ -156,5 +155,5 @@ def _product(left: Matrix, matrix: Matrix, squares: FloatArray) -> tuple[Matrix,
     """
     product = left @ matrix
     mean = np.abs(left) ** 2 @ squares + EPS**2 * ((left != 0.0).astype(float) @ np.abs(matrix) ** 2)
-    noise = np.abs(product) <= NOISE * np.sqrt(mean)
+    noise = np.abs(product) <= ROUNDING_NOISE * np.sqrt(mean)
     return np.where(noise, 0.0, product), np.where(noise, 0.0, mean)

@@ -1,19 +1,17 @@
 """The oracle: what the descriptor form itself says, by routes that the reduction does not take.
 
-The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`quadratics`), deflated
-to its finite part (`pencils`). Zeros are the finite eigenvalues of the system pencil
-
-    [ P(s)  -B(s) ]
-    [ F(s)   D(s) ]                                                                        (9)
+The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`first_order`), deflated
+to its finite part (`finite_part`).
 """
 
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.base.spectrum import sorted_eigenvalues
-from halfdof_ctrl.descriptor.finite_part import CLEAR_MARGIN, finite_part, infinite_part
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.spectrum import order_by_size
+from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
+from halfdof_ctrl.descriptor.found_structure import found_structure
 from halfdof_ctrl.descriptor.growth import improper_pairs
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -23,13 +21,20 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 class PencilStructure:
     """Eigenvalues of ``P(s)`` for n DOFs, found without the reduction."""
 
-    finite_eigenvalues: ComplexArray  #: by QZ [rad/s], sorted by size; those at the origin are exactly zero
+    finite_eigenvalues: ComplexArray  #: [rad/s], sorted by size; those at the origin are exactly zero
+    bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
+    most_index: int  #: the index, or a larger one that the ranks up to rounding have
+    most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
-    is_regular: bool  #: whether det P(s) is not identically zero
-    gap: float  #: smallest ratio of a pivot that counts to one that does not, in all rank decisions
-    is_certain: bool  #: False if a rank decision was so close to rounding that a count may be wrong
+    is_regular: bool  #: whether det P(s) is not identically zero, exactly
+    uncertainty: tuple[str, ...]  #: what is uncertain, a sentence each
     model: SecondOrderModel = field(repr=False)  #: whose structure this is
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether nothing is uncertain: the stored numbers say all of this exactly, and rounding left no part of it."""
+        return not self.uncertainty
 
     @property
     def index(self) -> int:
@@ -42,11 +47,23 @@ class PencilStructure:
         return self.is_regular and not self.improper_pairs
 
     @cached_property  # which is why this class has no slots
+    def gap(self) -> float:
+        """Smallest ratio of a pivot that counts to one that does not where ranks are decided by their size.
+
+        The counts do not rest on it, which are exact.
+        """
+        pencil = first_order_pencil((self.model.K, self.model.C, self.model.M))
+        return infinite_part(pencil.A, pencil.E).evidence.gap
+
+    @cached_property
     def improper_pairs(self) -> tuple[tuple[str, str, int], ...]:
-        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for."""
+        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for.
+
+        Raises `UncertainRankError` where rounding left a part of its own size that may grow.
+        """
         if not self.is_regular:
             return ()
-        return improper_pairs(self.model, self.finite_eigenvalues, self.index)
+        return improper_pairs(self.model, self.finite_eigenvalues, self.most_index, self.most_finite)
 
 
 def pencil_structure(model: SecondOrderModel) -> PencilStructure:
@@ -91,17 +108,16 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     (('F_q2', 'q2', 2),)
     """
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
-    pencil = first_order_pencil((model.K, model.C, model.M))
-    finite, infinite = finite_part(pencil.A, pencil.E), infinite_part(pencil.A, pencil.E)
-    eigenvalues = sorted_eigenvalues(finite.eigenvalues * pencil.scale)
-    adds_up = eigenvalues.size + sum(infinite.blocks) == len(pencil.E)
-    is_clear = infinite.evidence.margin > CLEAR_MARGIN
+    found = found_structure((model.K, model.C, model.M))
+    order = order_by_size(found.values)
     return PencilStructure(
-        finite_eigenvalues=eigenvalues,
-        n_infinite=2 * len(model.dofs) - eigenvalues.size,
-        infinite_blocks=infinite.blocks,
-        is_regular=finite.is_regular,
-        gap=infinite.evidence.gap,
-        is_certain=finite.is_certain and (not finite.is_regular or (adds_up and is_clear)),
+        finite_eigenvalues=read_only(found.values[order]),
+        bounds=read_only(found.bounds[order]),
+        most_index=found.most_index,
+        most_finite=found.most,
+        n_infinite=2 * len(model.dofs) - found.values.size,
+        infinite_blocks=found.blocks,
+        is_regular=found.is_regular,
+        uncertainty=found.doubts,
         model=model,
     )

@@ -1,4 +1,8 @@
-"""Transmission zeros from the second-order system pencil."""
+"""Invariant zeros: the finite eigenvalues of the second-order system pencil.
+
+[ P(s)  -B(s) ]
+[ F(s)   D(s) ]                                                                        (9)
+"""
 
 import warnings
 
@@ -9,11 +13,10 @@ from halfdof_ctrl.base.arrays import ComplexArray, Matrix
 from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
-from halfdof_ctrl.descriptor.finite_part import finite_part
-from halfdof_ctrl.descriptor.first_order import first_order_pencil
 from halfdof_ctrl.descriptor.growth import system_pencil
+from halfdof_ctrl.descriptor.invariant_zeros import invariant_zeros
 from halfdof_ctrl.descriptor.regularity import require_regular
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -69,16 +72,14 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
     require_regular(model)
     every = _independent(model)
-    pencil = first_order_pencil(system_pencil(model, *every))
-    part = finite_part(pencil.A, pencil.E)
-    if not part.is_certain:
+    found = invariant_zeros(system_pencil(model, *every))
+    if found.doubts:
         msg = (
-            f"The number of zeros, {part.eigenvalues.size}, is in doubt: a rank on which it rests is hardly to be told "
-            "from rounding. Inputs or outputs depend on each other but for rounding; leave one out by select() and "
-            "compare."
+            f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs "
+            "depend on each other but for rounding, or the model is rounded; leave one out by select() and compare."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    return sorted_eigenvalues(part.eigenvalues * pencil.scale)
+    return sorted_eigenvalues(found.values)
 
 
 def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
@@ -93,5 +94,5 @@ def _independent_columns(matrix: Matrix) -> list[int]:
     rows, columns = equilibrating_powers(np.abs(matrix))
     _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
     pivots = np.abs(np.diagonal(triangle))
-    rank = int(np.count_nonzero(pivots > RANK_TOLERANCE * max(matrix.shape) * pivots[0]))
+    rank = int(np.count_nonzero(pivots > ZERO_PIVOT * max(matrix.shape) * pivots[0]))
     return sorted(order[:rank].tolist())

@@ -19,7 +19,7 @@ from halfdof_ctrl.systems.state_space import mech2ss
 Weights: TypeAlias = Mapping[str, float] | None
 
 INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
-UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+UNSYMMETRIC_WEIGHTS = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,4 +180,4 @@ def _smallest_eigenvalue(matrix: FloatArray) -> float:
 
 
 def _is_symmetric(matrix: FloatArray) -> bool:
-    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())
+    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC_WEIGHTS * np.abs(matrix).max())

@@ -34,7 +34,6 @@ from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 
@@ -89,7 +88,7 @@ class StateFeedback:
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K
         partition = self.reduction.partition
-        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        maps = partition.state_maps()
         gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
         if len(gains) > DERIVATIVES:
             msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."

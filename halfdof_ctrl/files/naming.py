@@ -1,6 +1,5 @@
 """Refusals of a file carry its name."""
 
-import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,9 +12,7 @@ MOST_WORDS = 300  #: characters of another library's error that are passed on
 def naming_the_file(path: object) -> Iterator[None]:
     """Turn what goes wrong with a file's content into a refusal that names the file."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
-            yield
+        yield  # without touching the filters of warnings, which belong to all threads
     except MissingExtraError as refusal:
         msg = f"{path}: {refusal}"
         raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal

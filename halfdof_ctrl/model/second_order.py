@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, ComplexArray, Matrix, is_complex, read_only
+from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, EPS, ComplexArray, Matrix, is_complex, read_only
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.names import Names, as_tuple, listed, picked_places
 from halfdof_ctrl.base.sparse_arrays import (
@@ -26,6 +26,7 @@ from halfdof_ctrl.base.sparse_arrays import (
     unit_like,
     zeros_like,
 )
+from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
 from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
@@ -58,6 +59,7 @@ class SecondOrderModel:
     outputs: tuple[str, ...]  #: names of the p outputs
     name: str | None = None  #: name of the model, which the state space takes over
     prescribed: tuple[str, ...] = ()  #: DOFs, here or removed, whose motion is an input (see `prescribe_motion`)
+    known_to: float = EPS  #: relative rounding of the entries of M, C, K; 5e-10 from a file with ten digits
 
     @property
     def is_complex(self) -> bool:
@@ -177,6 +179,17 @@ class SecondOrderModel:
         )
         return model.select(new.inputs, new.outputs)
 
+    def as_descriptor(self) -> DescriptorForm:
+        """Give the model as a descriptor system ``E x' = A x + B u``, ``y = C x + D u`` of first order.
+
+        Returns
+        -------
+        DescriptorForm
+            Named tuple (E, A, B, C, D), sparse if the model is, for other tools that take a singular E (DAE,
+            semistate form). How to hand it on: docs/howto/descriptor-systems.md.
+        """
+        return descriptor_form(self)
+
     def as_dense(self) -> "SecondOrderModel":
         """Return the model with dense matrices: itself if they are.
 
@@ -203,11 +216,12 @@ class SecondOrderModel:
         title = f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
         complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
         prescribed_part = f"\n  motion prescribed: {listed(self.prescribed)}" if self.prescribed else ""
+        rounded_part = f"\n  entries known to {self.known_to:.0e}" if self.known_to > EPS else ""
         return (
             f"{title}: {len(self.dofs)} DOFs: {split_in_words(self.M, self.C, self.K)}\n"
             f"  dofs:    {listed(self.dofs)}\n"
             f"  inputs:  {listed(self.inputs)}\n"
-            f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}"
+            f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}{rounded_part}"
         )
 
 

@@ -18,12 +18,12 @@ import scipy.linalg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import SingularPencilError
 from halfdof_ctrl.base.names import listed
 
 Kind: TypeAlias = Literal["unattached", "unused", "floating", "redundant", "free", "empty", "identical", "dependent"]
-WORDS: dict[Kind, str] = {
+CAUSE_WORDS: dict[Kind, str] = {
     "unattached": "nothing is attached to {names}, no spring, no damper and no mass",
     "unused": "{names} appears in no equation",
     "floating": "{names} float as one body that springs and dampers tie to nothing else, and no mass takes part",
@@ -44,8 +44,8 @@ REMEDIES: dict[Kind, str] = {
     "dependent": "Put the equation that is missing in place of one that follows from others.",
 }
 MOST_CAUSES = 4  #: causes that a message spells out
-NULL = 64 * float(np.finfo(float).eps)  #: times the size: singular values below this part of the largest are zero
-SWEEPS = 10  #: of scaling, rows and columns in turns
+NULL = 64 * EPS  #: times the size: singular values below this part of the largest are zero
+SCALING_SWEEPS = 10  #: of scaling, rows and columns in turns
 NULL_VECTOR_SHARE = 1e-6  #: what has more than this share of a null vector in echelon form takes part in it
 Group: TypeAlias = frozenset[int]
 SINGLE: tuple[Kind, ...] = ("unattached", "unused", "empty")
@@ -62,7 +62,7 @@ class Cause:
 
     def __str__(self) -> str:
         """Say it in words."""
-        return WORDS[self.kind].format(names=listed(self.names))
+        return CAUSE_WORDS[self.kind].format(names=listed(self.names))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,7 +116,7 @@ def causes(null: NullSpaces, coefficients: Sequence[Matrix], dofs: Sequence[str]
 
 def _scaled(P: Matrix) -> Matrix:
     """Bring the largest entries of rows and columns near one."""
-    for _ in range(SWEEPS):
+    for _ in range(SCALING_SWEEPS):
         P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=1, initial=0.0)))[:, None]
         P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=0, initial=0.0)))
     return P
@@ -159,7 +159,7 @@ def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
 
 
 def _is_constant(columns: Matrix) -> bool:
-    """Tell whether columns of K, C and M on top of each other are dependent, so that a null vector holds at every s."""
+    """Return whether columns of K, C and M on top of each other depend, so that a null vector holds at every s."""
     values = scipy.linalg.svdvals(_scaled(columns))
     return bool(values[-1] <= NULL * max(columns.shape) * values[0])
 

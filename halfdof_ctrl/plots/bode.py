@@ -12,12 +12,8 @@ from matplotlib.ticker import MultipleLocator
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    HalfdofError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -46,19 +42,13 @@ from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
 PEAK_MARKS = 6  #: markers on the highest peaks besides
-CLOSE = 0.05  #: relative distance between frequencies below which one marker does for two peaks
+ONE_MARKER = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
-USUAL = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
-FLAT = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
-ROOM = 5.0  #: ... and gets this factor above and below
-SPIKE = 1e5  #: a peak higher than this times that range is cut
-NO_STATE_SPACE: dict[type[HalfdofError], str] = {
-    ComplexModelError: "model is complex",
-    ImproperError: "improper",
-    SingularLeadingMatrixError: "W is singular",
-    UncertainRankError: "order uncertain",
-}
+USUAL_WIDTH = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
+FLAT_RATIO = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
+FLAT_ROOM = 5.0  #: ... and gets this factor above and below
+RESONANCE_SPIKE = 1e5  #: a peak higher than this times that range is cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,8 +183,8 @@ def _curve(
             return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
             mech2ss(sysdata)
-        except tuple(NO_STATE_SPACE) as error:
-            kind = f"descriptor form (no state space: {NO_STATE_SPACE[type(error)]})"
+        except NoStateSpaceError as refusal:
+            kind = f"descriptor form (no state space: {refusal.why})"
             return descriptor_response(sysdata, omega), kind, reference
         curve = frequency_response(sysdata, omega)
         if reference is None and not (sysdata.is_sparse and len(sysdata.dofs) > LARGEST_DENSE_COPY):
@@ -228,7 +218,8 @@ def _marked(curve: control.FrequencyResponseData) -> npt.NDArray[np.intp]:
     peaks = np.where((inner > size[:, :-2]) & (inner > size[:, 2:]), inner, 0.0).max(axis=0)
     highest: list[int] = []
     for k in (1 + np.argsort(-peaks, kind="stable")[: np.count_nonzero(peaks)]).tolist():
-        if len(highest) < PEAK_MARKS and all(abs(frequencies[k] - frequencies[other]) > CLOSE for other in highest):
+        apart = all(abs(frequencies[k] - frequencies[other]) > ONE_MARKER for other in highest)
+        if apart and len(highest) < PEAK_MARKS:
             highest.append(k)
     return np.asarray(usable[np.union1d(spread, np.array(highest, dtype=np.intp))])
 
@@ -269,12 +260,12 @@ def _set_logarithmic(ax: Axes) -> None:
     curve = curve[np.isfinite(curve) & (curve > 0.0)]
     if curve.size == 0:
         return
-    if curve.max() <= FLAT * curve.min():
-        ax.set_ylim(curve.min() / ROOM, curve.max() * ROOM)
+    if curve.max() <= FLAT_RATIO * curve.min():
+        ax.set_ylim(curve.min() / FLAT_ROOM, curve.max() * FLAT_ROOM)
     ax.set_yscale("log")
-    usual = usual_largest(ax, USUAL)
-    if ax.dataLim.y1 > SPIKE * usual:
-        ax.set_ylim(top=np.sqrt(SPIKE) * usual)
+    usual = usual_largest(ax, USUAL_WIDTH)
+    if ax.dataLim.y1 > RESONANCE_SPIKE * usual:
+        ax.set_ylim(top=np.sqrt(RESONANCE_SPIKE) * usual)
 
 
 def _set_phase_ticks(ax: Axes) -> None:

@@ -14,14 +14,14 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
+WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
 FAR = 20.0  #: times all others, those that swing among them: a point so far out gets logarithmic axes too
 LOGARITHMIC_LABELS = (1e-3, 1e4)  #: numbers outside are written with a power of ten
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 DISCRETE_RATIOS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
-APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+LABELS_APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
-SAME = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
+SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -37,7 +37,7 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
     smallest = float(size[size > 0.0].min(initial=largest))
     left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     height = float(np.abs(points.imag).max(initial=0.0))
-    if not discrete and (largest > WIDE * smallest or _is_squeezed(points)):
+    if not discrete and (largest > WIDE_PLANE * smallest or _is_squeezed(points)):
         linear = 10.0 ** np.floor(np.log10(smallest))
         for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
             set_scale("symlog", linthresh=linear)
@@ -69,7 +69,7 @@ def draw_pole_grid(ax: Axes) -> None:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
         inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
         end = inside[-1] if inside.size else last
-        if np.hypot(*(end - last)) < APART or np.hypot(*(end - (0.0, 0.5))) < APART:
+        if np.hypot(*(end - last)) < LABELS_APART or np.hypot(*(end - (0.0, 0.5))) < LABELS_APART:
             continue
         last = end
         _draw_mirrored(ax, ray)
@@ -82,10 +82,10 @@ def draw_pole_grid(ax: Axes) -> None:
         arc = radius * np.exp(1j * angles)
         path = _axes_coordinates(ax, arc.conj())[_inside(ax, arc)]
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-        if length[-1] > APART:
+        if length[-1] > LABELS_APART:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
-            if np.hypot(*(middle - last)) > APART and middle[0] > EDGE:
+            if np.hypot(*(middle - last)) > LABELS_APART and middle[0] > EDGE:
                 ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
                 last = middle
 
@@ -115,7 +115,7 @@ def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str
     """Write the multiplicity beside points that coincide up to rounding; poles at the origin are exact zeros."""
     left = points
     while left.size:
-        same = np.abs(left - left[0]) <= SAME * np.abs(left[0])
+        same = np.abs(left - left[0]) <= SAME_POLE * np.abs(left[0])
         if np.count_nonzero(same) > 1:
             ax.annotate(
                 f"{np.count_nonzero(same)}x",

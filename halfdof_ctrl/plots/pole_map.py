@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, UncertainRankError
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
@@ -25,7 +25,7 @@ Mark: TypeAlias = tuple[ComplexArray, str, dict[str, Any]]
 NONE = np.zeros(0, dtype=np.complex128)
 CROSS: dict[str, Any] = {"marker": "x", "color": "C0", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
 RING: dict[str, Any] = {"marker": "o", "color": "black", "markersize": 13.0, "markerfacecolor": "none", "zorder": 2.9}
-ZERO: dict[str, Any] = {
+ZERO_MARK: dict[str, Any] = {
     "marker": "D",
     "color": "C2",
     "markersize": 8.0,
@@ -115,14 +115,14 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
         marks = [
             *_poles_of_A(sysdata, closed),
             (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
-            (zeros(sysdata), "zeros", ZERO),
+            (zeros(sysdata), "zeros", ZERO_MARK),
             (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NOTHING),
         ]
     else:
         poles = bounded_poles(np.asarray(sysdata.A, dtype=float)).values
         if sysdata.isdtime(strict=True):
             poles = np.asarray(sysdata.poles())
-        marks = [(poles, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO)]
+        marks = [(poles, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
     if feedback is not None:
         marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
     return [mark for mark in marks if mark[0].size or mark[2] is NOTHING]
@@ -131,7 +131,7 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
         poles = poles_of_model(model, working_matrix(model)).values
-    except (ComplexModelError, UncertainRankError):
+    except NoStateSpaceError:
         return []
     return [(poles, f"poles of A{closed}", CROSS)]
 

@@ -37,12 +37,15 @@ Models: TypeAlias = SecondOrderModel | Iterable[SecondOrderModel]
 Labels: TypeAlias = str | Sequence[str] | None
 
 SCALES: tuple[Scale, ...] = get_args(Scale)
-ANGLE_STEPS = {True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0), False: (1.0, 2.0, 5.0, 10.0)}  #: of ticks, by WIDE or not
-WIDE = 60.0  #: [deg] range of angles with ticks at parts of a right angle
-USUAL = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
-SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
-ROOM = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
-FLAT = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
+ANGLE_STEPS = {
+    True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0),
+    False: (1.0, 2.0, 5.0, 10.0),
+}  #: of ticks, by WIDE_ANGLES or not
+WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
+USUAL_WIDTH = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
+STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
+ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
+CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
 
 
 def dynamic_stiffness_plot(
@@ -68,8 +71,8 @@ def dynamic_stiffness_plot(
     dof : str or sequence of str
         DOF that is moved, as in `dynamic_stiffness`.
     omega : (k,) array_like, optional
-        Frequencies [rad/s], the very points; also with `Hz`. By default those of `stiffness.motion_frequencies`,
-        the same for all models.
+        Frequencies [rad/s], the very points; also with `Hz`. By default the same for all models, those of
+        `~halfdof_ctrl.systems.stiffness.motion_frequencies`.
     ax : (2,) array_like of Axes, optional
         For the modulus and the loss angle.
     xscale, yscale : {"linear", "log"}
@@ -265,8 +268,8 @@ def _set_angle(ax: Axes) -> None:
     """Put ticks where angles are read, and show a constant angle as such."""
     angles = _drawn(ax)
     span = float(np.ptp(angles)) if angles.size else 0.0
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE])))
-    if angles.size and span < FLAT:
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE_ANGLES])))
+    if angles.size and span < CONSTANT_SPAN:
         ax.set_ylim(angles.mean() - 1.0, angles.mean() + 1.0)
 
 
@@ -277,11 +280,11 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = usual_largest(ax, USUAL)
-    if curve.max() - curve.min() <= FLAT * curve.max():
+    usual = usual_largest(ax, USUAL_WIDTH)
+    if curve.max() - curve.min() <= CONSTANT_SPAN * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
-    elif curve.max() > SPIKE[scale] * usual:
-        ax.set_ylim(top=ROOM[scale] * usual)
+    elif curve.max() > STIFFNESS_SPIKE[scale] * usual:
+        ax.set_ylim(top=ROOM_ABOVE[scale] * usual)
     if scale == "linear" and ax.get_ylim()[0] < 0.0:
         ax.set_ylim(bottom=0.0)
 

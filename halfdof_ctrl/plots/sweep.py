@@ -26,9 +26,9 @@ Kind: TypeAlias = Literal["bode", "poles"]
 
 MANY = 12  #: from so many curves on they are drawn thinner
 BRANCH: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "label": "_branch", "zorder": 2.4}
-FIRST: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
-BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
-LAST: dict[str, Any] = {"marker": "s", "markersize": 5.5, "markeredgewidth": 0.0, "zorder": 3.1}
+FIRST_CASE: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
+CASES_BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
+LAST_CASE: dict[str, Any] = {"marker": "s", "markersize": 5.5, "markeredgewidth": 0.0, "zorder": 3.1}
 ARROW: dict[str, Any] = {
     "arrowstyle": "-|>",
     "color": "0.35",
@@ -171,12 +171,12 @@ def _draw_poles(result: SweepResult, cases: CaseColours, ax: AxesLike, *, grid: 
         set_pole_axes(plane, shown[~np.isnan(shown)], discrete=result.discrete)
         draw_plane(plane, grid=grid, discrete=result.discrete)
     ways = _ways(result, cases)
-    ends = {number: style for way in ways for number, style in ((way[0], FIRST), (way[-1], LAST))}
+    ends = {number: style for way in ways for number, style in ((way[0], FIRST_CASE), (way[-1], LAST_CASE))}
     for place, number in enumerate(cases.numbers.tolist()):
         label = cases.entry(place) if number in ends else _label(cases, place)
         points = poles[number]
         style = {"color": cases.colours[place], "linestyle": "none", "label": label}
-        lines[0, 0] += plane.plot(points.real, points.imag, **style, **ends.get(number, BETWEEN))
+        lines[0, 0] += plane.plot(points.real, points.imag, **style, **ends.get(number, CASES_BETWEEN))
     for way in ways:
         for branch in followed(poles[way]).T:
             lines[0, 0] += plane.plot(branch.real, branch.imag, **BRANCH)

@@ -22,11 +22,11 @@ Colour: TypeAlias = tuple[float, float, float, float]
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
 LIGHTEST = 0.9  #: part of viridis that is seen on white
-MOST_ENTRIES = 6  #: values that a legend names; more of them get a colour bar
-DECADES = 30.0  #: ratio of the largest value to the smallest from which colours follow the logarithm
+MOST_NAMED_VALUES = 6  #: values that a legend names; more of them get a colour bar
+WIDE_VALUES = 30.0  #: ratio of the largest value to the smallest from which colours follow the logarithm
 FEWEST_DIGITS, MOST_DIGITS = 4, 10  #: of a number in a legend
-SAME = 1e-9  #: relative difference of values that count as one
-PLAIN: Colour = (0.12, 0.47, 0.71, 1.0)  #: where nothing was varied
+SAME_VALUE = 1e-9  #: relative difference of values that count as one
+ONE_COLOUR: Colour = (0.12, 0.47, 0.71, 1.0)  #: where nothing was varied
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,7 +87,7 @@ def coloured_cases(result: SweepResult, parameter: str | None, at: Mapping[str, 
     elif several:
         parameter = several[0]
     if parameter is None:
-        return CaseColours(numbers, "", np.zeros(numbers.size), (PLAIN,) * numbers.size, None)
+        return CaseColours(numbers, "", np.zeros(numbers.size), (ONE_COLOUR,) * numbers.size, None)
     values = result.parameters[parameter].reshape(-1)[numbers]
     colours, scale = _coloured(values)
     return CaseColours(numbers, parameter, values, colours, scale)
@@ -125,9 +125,9 @@ def _coloured(values: Values) -> tuple[tuple[Colour, ...], ScalarMappable | None
     """Colour the values: by their place among a few, by their size among many."""
     distinct = _distinct(values)
     colourmap = _colourmap()
-    if len(distinct) > MOST_ENTRIES and values.dtype.kind in "iuf":
+    if len(distinct) > MOST_NAMED_VALUES and values.dtype.kind in "iuf":
         low, high = float(values.min()), float(values.max())
-        norm = LogNorm(low, high) if low > 0.0 and high > DECADES * low else Normalize(low, high)
+        norm = LogNorm(low, high) if low > 0.0 and high > WIDE_VALUES * low else Normalize(low, high)
         scale = ScalarMappable(norm, colourmap)
         return tuple([tuple(colour) for colour in scale.to_rgba(values.astype(float)).tolist()]), scale
     places = [distinct.index(value) for value in values.tolist()]
@@ -146,7 +146,7 @@ def _distinct(values: Values) -> list[Any]:
 def _are_same(first: object, second: object) -> bool:
     """Compare two values, numbers up to rounding."""
     if isinstance(first, int | float) and isinstance(second, int | float | np.integer | np.floating):
-        return math.isclose(first, second, rel_tol=SAME)
+        return math.isclose(first, second, rel_tol=SAME_VALUE)
     return bool(first == second)
 
 

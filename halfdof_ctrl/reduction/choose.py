@@ -1,18 +1,23 @@
-"""The choice of the method: propose, prove, choose."""
+"""The choice of the method: propose, prove, choose.
 
-from halfdof_ctrl.base.errors import ParameterError
+Each method in turn proposes state equations and proves them; the first that is proved is taken. What it rests on goes
+with it, and what of that a user must know is warned of once, here.
+"""
+
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
+from halfdof_ctrl.base.errors import ModelSizeError, ParameterError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.deflation.method import by_deflation
-from halfdof_ctrl.reduction.dense.method import by_leading_matrix
+from halfdof_ctrl.reduction.dense.method import by_bases, by_selection
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.method.evidence import Road
-from halfdof_ctrl.reduction.sparse.method import sparsely_reduced
-
-ROADS: tuple[Road | None, ...] = ("selection", "orthogonal", "deflation", None)
+from halfdof_ctrl.reduction.method.protocol import METHODS, MethodName, ReductionMethod
+from halfdof_ctrl.reduction.sparse.method import by_sparse_bases, by_sparse_selection
 
 
-def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method: Road | None = None) -> ExactReduction:
+def exact_reduction(
+    model: SecondOrderModel, *, tol: float | None = None, method: MethodName | None = None
+) -> ExactReduction:
     """Reduce a model with singular mass to its exact states.
 
     Parameters
@@ -21,10 +26,10 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
         A real model with n DOFs.
     tol : float, optional
         Size of a mass, relative to the largest in scaled units, up to which it counts as none
-        (see `partition.select_columns` and `partition.orthonormal_bases`), and of singular values in
+        (see `dense.selection.select_columns` and `dense.bases.orthonormal_bases`), and of singular values in
         deflation. By default only exact zeros and rounding count as none.
     method : {"selection", "orthogonal", "deflation"}, optional
-        Road to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
+        Method to take; by default selection of DOFs, orthonormal bases where that leaves W singular, and
         deflation where they do too (index above one). The default also takes orthonormal bases where DOFs as
         states would lose digits that those keep.
 
@@ -45,7 +50,7 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     UncertainRankError
         Entries nearly cancel, so that the number of states cannot be told to working precision.
     SingularLeadingMatrixError
-        `method` asks for a road on which W of equation (2) is singular to working precision (rcond below
+        `method` asks for a method by which W of equation (2) is singular to working precision (rcond below
         max(n, 256) eps after scaling).
 
     Warns
@@ -74,17 +79,44 @@ def exact_reduction(model: SecondOrderModel, *, tol: float | None = None, method
     if model.is_complex:
         raise complex_model_error(model)
     _require_valid(tol, method)
-    if model.is_sparse:
-        reduced = sparsely_reduced(model, tol, method)
-        if reduced is not None:
-            return reduced
-        model = model.as_dense()
-    found = None if method == "deflation" else by_leading_matrix(model, tol, method)
-    return by_deflation(model, tol) if found is None else found
+    solution = _sparsely_solved(model, tol, method) if model.is_sparse else None
+    if solution is None:
+        solution = _solved(model.as_dense() if model.is_sparse else model, tol, method)
+    solution.evidence.warn(tol)
+    return ExactReduction(model=solution.model, solution=solution, tol=tol)
 
 
-def _require_valid(tol: float | None, method: Road | None) -> None:
-    if method not in ROADS:
+def _solved(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> ReductionMethod:
+    """Return the first proposal that is proved, or the one that was asked for."""
+    asked = method is not None
+    if method in {None, "selection"}:
+        found = by_selection(model, tol, asked=asked)
+        if found is not None:
+            return found
+    if method in {None, "orthogonal"}:
+        found = by_bases(model, tol, asked=asked)
+        if found is not None:
+            return found
+    return by_deflation(model, tol)
+
+
+def _sparsely_solved(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> ReductionMethod | None:
+    """Do so with sparse matrices; None for what its dense copy serves."""
+    if method == "deflation":
+        return None
+    too_large = max(len(model.dofs), len(model.inputs), len(model.outputs)) > LARGEST_DENSE_COPY
+    asked = method is not None
+    try:
+        found = None if method == "orthogonal" else by_sparse_selection(model, tol, asked=asked)
+        return found or by_sparse_bases(model, tol, asked=asked or too_large)
+    except ModelSizeError:
+        if asked or too_large:
+            raise
+        return None
+
+
+def _require_valid(tol: float | None, method: MethodName | None) -> None:
+    if method is not None and method not in METHODS:
         msg = f"method must be 'selection', 'orthogonal', 'deflation' or None, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
     if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):

@@ -7,6 +7,7 @@ All of q follows from the state and the inputs:
 Derivatives of the inputs (Bv, Ba) are absorbed by x = x~ + E_0 u + E_1 u' (5), so that x~' = A x~ + B u.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -14,15 +15,11 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import InconsistentStateError, SingularLeadingMatrixError
+from halfdof_ctrl.base.errors import InconsistentStateError
 from halfdof_ctrl.base.names import listed, motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR, LeadingMatrix
-from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
-from halfdof_ctrl.reduction.deflation.states import StateSelection
-from halfdof_ctrl.reduction.dense.partition import DofPartition
-from halfdof_ctrl.reduction.dense.single_solve import rounding_of_solve
-from halfdof_ctrl.reduction.method.evidence import RankDecision, Road
+from halfdof_ctrl.reduction.method.evidence import RankDecision
+from halfdof_ctrl.reduction.method.protocol import Coordinates, MethodName, ReductionMethod
 from halfdof_ctrl.reduction.method.recovery import (
     RecoveredMotion,
     TimeResponse,
@@ -30,10 +27,7 @@ from halfdof_ctrl.reduction.method.recovery import (
     given_values,
     require_consistent,
 )
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal
-from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
-from halfdof_ctrl.reduction.sparse.single_solve import SparseReduction
+from halfdof_ctrl.reduction.method.signals import Signal
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -44,32 +38,28 @@ class ExactReduction:
     """
 
     model: SecondOrderModel  #: the model that was reduced
-    partition: DofPartition | SparsePartition | StateSelection  #: which coordinates are inertial, half and static
-    leading: LeadingMatrix | SparseLU | None  #: W of equation (2), factorized; None where the road is `deflation`
-    equations: StateEquations | SparseReduction  #: A, B and the way back to q
-    rcond: float  #: reciprocal condition number of W, or the smallest of the systems (18), on which the states rest
-    known_rounding: Rounding | None = None  #: rounding errors of the equations, where the road has followed them
+    solution: ReductionMethod  #: what the method that was taken gave
     tol: float | None = None  #: what `exact_reduction` was given
 
     @property
     def A(self) -> FloatArray:  # noqa: N802
         """(N, N) state matrix."""
-        return self.equations.A
+        return self.solution.A
 
     @property
     def B(self) -> FloatArray:  # noqa: N802
         """(N, m) input matrix."""
-        return self.equations.B
+        return self.solution.B
 
     @property
-    def displacement(self) -> Signal | SparseDisplacement:
-        """All n displacements as functions of state and inputs, equation (4)."""
-        return self.equations.displacement
+    def partition(self) -> Coordinates:
+        """Which coordinates are inertial, half and static."""
+        return self.solution.coordinates
 
     @property
     def shift(self) -> tuple[FloatArray, ...]:
         """E_0, E_1, ... of equation (5), (N, m) each; empty unless derivatives of inputs reach the states."""
-        return self.equations.shift
+        return self.solution.shift
 
     @property
     def order(self) -> int:
@@ -87,33 +77,38 @@ class ExactReduction:
 
         Constraints of displacements give 3, of velocities 2.
         """
-        if isinstance(self.partition, StateSelection):
-            from halfdof_ctrl.reduction.deflation.method import index_of  # noqa: PLC0415
-
-            return index_of(self)
-        return int(self.partition.n_static > 0)
+        return self.solution.index()
 
     @property
-    def method(self) -> Road:
-        """Which road was taken: `selection` of DOFs, `orthogonal` bases or `deflation`."""
-        return self.partition.method
+    def method(self) -> MethodName:
+        """Which method was taken: `selection` of DOFs, `orthogonal` bases or `deflation`."""
+        return self.solution.name
+
+    @property
+    def rcond(self) -> float:
+        """Reciprocal condition number of W, or the smallest of the systems (18), on which the states rest."""
+        return self.solution.evidence.rcond
 
     @property
     def evidence(self) -> tuple[RankDecision, ...]:
         """The singular values that decisions about ranks rest on, block by block; those of W come last."""
-        if not isinstance(self.leading, LeadingMatrix) or not isinstance(self.partition, DofPartition):
-            return self.partition.evidence
-        values = self.leading.singular_values()
-        bound = len(values) * SINGULAR * float(values.max(initial=0.0))
-        regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
-        return (*self.partition.evidence, regular)
+        return self.solution.decisions()
+
+    @property
+    def displacement(self) -> Signal:
+        """All n displacements as functions of state and inputs, equation (4).
+
+        Raises
+        ------
+        ModelSizeError
+            A sparse model with so many DOFs and states that this is too large.
+        """
+        return self.solution.motion(0)
 
     @property
     def output(self) -> Signal:
         """The model's outputs as functions of state, inputs and, where they are improper, derivatives of inputs."""
-        if isinstance(self.equations, SparseReduction):
-            return self.equations.displacement.output(self.model)
-        return output_signal(self.model, self.equations, self._rounding)
+        return self.solution.output(self.model)
 
     @property
     def polynomial_part(self) -> tuple[FloatArray, ...]:
@@ -127,9 +122,9 @@ class ExactReduction:
         Raises
         ------
         SingularLeadingMatrixError
-            The road is `deflation`, since W is singular.
+            The method is `deflation`, since W is singular.
         """
-        return self._inverse_rows()[: len(self.partition.inertial)]
+        return self.solution.inverse_rows()[: len(self.partition.inertial)]
 
     @property
     def alpha(self) -> FloatArray:
@@ -138,10 +133,9 @@ class ExactReduction:
         Raises
         ------
         SingularLeadingMatrixError
-            The road is `deflation`, since W is singular.
+            The method is `deflation`, since W is singular.
         """
-        first = len(self.partition.inertial)
-        return self._inverse_rows()[first : first + len(self.partition.half)]
+        return self.solution.inverse_rows()[len(self.partition.inertial) :]
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -156,10 +150,7 @@ class ExactReduction:
         ModelSizeError
             A sparse model with so many DOFs and states that this is too large.
         """
-        signal = self.displacement.whole() if isinstance(self.displacement, SparseDisplacement) else self.displacement
-        for _ in range(derivative):
-            signal = signal.derivative(self.A, self.B)
-        return signal
+        return self.solution.motion(derivative)
 
     def state(
         self,
@@ -199,12 +190,7 @@ class ExactReduction:
         if self.shift:
             x = x - self.shift[0] @ u
         for derivative, given in enumerate((q, v)):
-            if isinstance(self.displacement, SparseDisplacement):
-                at_rest = [np.zeros((u.size, 1))] * 3
-                required = self.displacement.motion_at(x[:, None], [u[:, None], *at_rest], derivative)[:, 0]
-            else:
-                motion = self.motion(derivative)
-                required = motion.X @ x + motion.direct(u.size) @ u
+            required = self.solution.motion_at(x[:, None], [u[:, None]], derivative)[:, 0]
             require_consistent(motion_names(model.dofs, derivative), given, required)
         return x
 
@@ -234,25 +220,22 @@ class ExactReduction:
             )
             raise InconsistentStateError(msg, names=self.states, given=(), required=())
         time = np.asarray(response.t, dtype=float)
-        if isinstance(self.displacement, SparseDisplacement):
-            displacement, velocity = self.displacement.histories(x, u, time)
-            return RecoveredMotion(time=time, displacement=displacement, velocity=velocity, dofs=self.model.dofs)
         slopes = [u]
-        histories = []
-        for derivative in range(2):
-            motion = self.motion(derivative)
-            history = np.tensordot(motion.X, x, axes=1)
-            for power, part in enumerate(motion.U):
-                if power == len(slopes):
-                    slopes.append(forward_slope(slopes[-1], time))
-                history += np.tensordot(part, slopes[power], axes=1)
-            histories.append(history)
-        return RecoveredMotion(time=time, displacement=histories[0], velocity=histories[1], dofs=self.model.dofs)
+        for _ in range(self.solution.input_derivatives):
+            slopes.append(forward_slope(slopes[-1], time))
+        samples = math.prod(x.shape[1:])
+        flat = [values.reshape(len(values), samples) for values in slopes]
+        shape = (len(self.model.dofs), *x.shape[1:])
+        displacement, velocity = [
+            self.solution.motion_at(x.reshape(self.order, samples), flat, derivative).reshape(shape)
+            for derivative in range(2)
+        ]
+        return RecoveredMotion(time=time, displacement=displacement, velocity=velocity, dofs=self.model.dofs)
 
     def __repr__(self) -> str:
         """Say how many states came of which DOFs, and how sure that is."""
         part = self.partition
-        rests_on = "W" if self.leading is not None else "J"
+        rests_on = "J" if self.method == "deflation" else "W"
         return (
             f"ExactReduction by {self.method}: {self.order} states, {self.n_infinite} infinite eigenvalues removed, "
             f"index {self.index}, rcond({rests_on}) = {self.rcond:.1e}\n"
@@ -260,18 +243,3 @@ class ExactReduction:
             f"  half:     {listed(part.half) or '-'}\n"
             f"  static:   {listed(part.static) or '-'}"
         )
-
-    def _rounding(self) -> Rounding:
-        equations, partition, leading = self.equations, self.partition, self.leading
-        known = isinstance(equations, SparseReduction) or not isinstance(partition, DofPartition)
-        if known or not isinstance(leading, LeadingMatrix) or self.known_rounding is not None:
-            return self.known_rounding  # type: ignore[return-value]
-        return rounding_of_solve(self.model, partition, leading, equations)  # type: ignore[arg-type]
-
-    def _inverse_rows(self) -> FloatArray:
-        if self.leading is None:
-            msg = "W of equation (2) is singular, so that alpha and gamma, the rows of its inverse, do not exist."
-            raise SingularLeadingMatrixError(msg, dofs=(), rcond=0.0)
-        if isinstance(self.displacement, SparseDisplacement):
-            return self.displacement.inverse_rows()
-        return self.leading.solve(np.eye(len(self.model.dofs)))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, SingularLeadingMatrixError
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.base.names import Names, force_names, motion_names, name_from_label, unknown_name_error
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
@@ -27,7 +27,7 @@ from halfdof_ctrl.systems.frequency import frequency_response
 System: TypeAlias = SecondOrderModel | control.StateSpace
 Quantity: TypeAlias = Literal["poles", "response"] | Callable[[Any], object]
 
-NUMBERS = "biufc"  #: kinds of arrays that count as results
+RESULT_KINDS = "biufc"  #: kinds of arrays that count as results
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -208,7 +208,7 @@ def poles_of(system: System) -> ComplexArray:
         return by_size(_eigenvalues(np.asarray(system.A)))
     try:
         return by_size(_eigenvalues(exact_reduction(system).A))
-    except (ComplexModelError, SingularLeadingMatrixError):
+    except NoStateSpaceError:
         require_regular(system)
         return by_size(pencil_structure(system).finite_eigenvalues)
 
@@ -242,7 +242,7 @@ def as_numbers(value: object) -> npt.NDArray[Any]:
         array = np.asarray(value)
     except ValueError:  # rows of different length
         array = np.empty(0, dtype=object)
-    if array.dtype.kind not in NUMBERS:
+    if array.dtype.kind not in RESULT_KINDS:
         msg = f"The function gave {type(value).__name__}, but a sweep keeps numbers and arrays of numbers alone."
         raise ParameterError(msg, parameter="function", value=type(value).__name__)
     return array

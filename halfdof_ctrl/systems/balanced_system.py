@@ -6,7 +6,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.spectrum import ROUNDING, balanced_states
+from halfdof_ctrl.base.spectrum import ROUNDING_OF_A, balanced_states
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,5 +40,5 @@ class BalancedSystem:
                 changes.append(np.zeros(self.D.shape))
                 continue
             values.append(self.C @ x + self.D)
-            changes.append(ROUNDING * (np.abs(y).T @ size + np.abs(self.C)) @ np.abs(x))
+            changes.append(ROUNDING_OF_A * (np.abs(y).T @ size + np.abs(self.C)) @ np.abs(x))
         return np.stack(values, axis=2), np.stack(changes, axis=2)

@@ -6,8 +6,8 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
 
-SMALL = 1e-6  #: of the largest or of the typical frequency: eigenvalues below may stand for one at the origin
-AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
+SMALL_EIGENVALUE = 1e-6  #: of the largest or the typical frequency: eigenvalues below may stand for one at the origin
+EIGENVALUE_AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
 MOST_POLE_POINTS = 100  #: poles that get a point of their own
@@ -21,7 +21,7 @@ def moving_eigenvalues(finite: ComplexArray, A: FloatArray, gamma: float) -> Com
     Where none is left, the model's typical frequency stands for the time scale.
     """
     poles, rounding = eigenvalues_and_rounding(A)
-    away = finite[np.abs(finite) > AT_ORIGIN * gamma]
+    away = finite[np.abs(finite) > EIGENVALUE_AT_ORIGIN * gamma]
     if poles.size and away.size:
         nearest = np.abs(away[:, None] - poles).argmin(axis=1)
         away = away[~(_is_small(away, gamma) & (np.abs(poles) <= rounding)[nearest])]
@@ -30,7 +30,7 @@ def moving_eigenvalues(finite: ComplexArray, A: FloatArray, gamma: float) -> Com
 
 def _is_small(eigenvalues: ComplexArray, gamma: float) -> npt.NDArray[np.bool_]:
     """Return which eigenvalues are so small that they may stand for one at the origin."""
-    return np.asarray(np.abs(eigenvalues) <= SMALL * max(np.abs(eigenvalues).max(initial=0.0), gamma))
+    return np.asarray(np.abs(eigenvalues) <= SMALL_EIGENVALUE * max(np.abs(eigenvalues).max(initial=0.0), gamma))
 
 
 def check_points(moving: ComplexArray) -> ComplexArray:

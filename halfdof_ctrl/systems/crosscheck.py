@@ -19,7 +19,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two, read_only
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
-from halfdof_ctrl.base.spectrum import ROUNDING
+from halfdof_ctrl.base.spectrum import ROUNDING_OF_A
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.first_order import typical_frequency
@@ -37,7 +37,7 @@ from halfdof_ctrl.systems.second_opinion import second_opinion
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
 SAFETY = 10.0  #: times what one random rounding of the descriptor form changes in a step response
-ROUNDING_OF_ZERO = 1024 * np.finfo(float).eps  #: of the size of output and input, left of a channel that is zero
+ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -203,7 +203,7 @@ def _compare_transfer(
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
     quadratics = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
-    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING / EPS)
+    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING_OF_A / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
     worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {complex_in_words(points[k])}"
@@ -257,7 +257,7 @@ def _rounded(model: SecondOrderModel) -> SecondOrderModel:
     generator = np.random.default_rng(0)
     letters = ("M", "C", "K", "B", "F", "G", "H", "D")
     entries = {letter: getattr(model, letter) for letter in letters}
-    shares = {letter: ROUNDING * generator.uniform(-1.0, 1.0, entry.shape) for letter, entry in entries.items()}
+    shares = {letter: ROUNDING_OF_A * generator.uniform(-1.0, 1.0, entry.shape) for letter, entry in entries.items()}
     rounded: dict[str, Any] = {k: read_only(entry * (1.0 + shares[k])) for k, entry in entries.items()}
     return replace(model, **rounded)
 

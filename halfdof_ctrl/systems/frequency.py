@@ -12,15 +12,13 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.model.kinds import null_column_kinds
@@ -38,13 +36,12 @@ from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 from halfdof_ctrl.systems.working_states import response_of_form, working_form
 
-NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
-AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
+POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
 ZERO_EFFORT = 1e7  #: channels times cubed size up to which the grid is refined at zeros
 MOST_CIRCLED = 400  #: states up to which poles count by their residues
 DISCRETE_ORIGIN = 1e-12  #: |log z| of a pole at 1 that rounding has moved
@@ -82,6 +79,9 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     -----
     InterruptedResponseWarning
         The user stopped it.
+    DataLimitWarning
+        Entries known to their last digit do not determine the response to 1e-6 of its value; the message names the
+        frequency where it is worst.
 
     Examples
     --------
@@ -95,7 +95,7 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     else:
         require_regular(model)
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
-        values = model(1j * frequencies, squeeze=False)
+        values = dense_frequency_response(model, frequencies)
     name = None if model.name is None else control_label(model.name)
     data = _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
     return with_source(data, source_of(model))
@@ -142,7 +142,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
         form = working_form(sysdata, sys.nstates)
     else:
@@ -184,7 +184,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         try:
             reduction = exact_reduction(model)
             return _grid(*system_modes(mech2ss(reduction, improper="drop"), reduction.polynomial_part, model))
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)
     return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
@@ -244,7 +244,7 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
             stiffness = ShiftedStiffness.factorized(K, M)
             if stiffness is not None:
                 omega = lowest_modes(stiffness, GRID_MODES).omega
-    moving = np.asarray(omega[omega > AT_ORIGIN * omega.max(initial=0.0)])
+    moving = np.asarray(omega[omega > POLE_AT_ORIGIN * omega.max(initial=0.0)])
     if moving.size == 0:
         require_regular(model)
         msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."

@@ -81,7 +81,7 @@ def mech2ss(
     Returns
     -------
     control.StateSpace
-        Labels are the model's names, with ``.`` written as ``:`` (see `names.control_label`).
+        Labels are the model's names, with ``.`` written as ``:`` (see `~halfdof_ctrl.base.names.control_label`).
 
     Raises
     ------

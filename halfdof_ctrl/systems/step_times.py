@@ -16,13 +16,13 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles
 from halfdof_ctrl.systems.seen_modes import seen_modes
 
-SETTLED = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
+SETTLING_TIME_CONSTANTS = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
 MOST_PERIODS = 20  #: of a lightly damped mode; more would fill the picture
 SEEN = 200  #: a mode that settles within this fraction of the horizon is a jump to the eye
-FINE = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
-COARSE = 1.0  #: the same where FINE would take too many points: 6 points a period
+FINE_STEP = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
+COARSEST_STEP = 1.0  #: the same where FINE_STEP would take too many points: 6 points a period
 FEWEST_STEPS = 500
-MOST_STEPS = 10_000
+MOST_TIME_STEPS = 10_000
 NO_SCALE = 1.0  #: [s] horizon of a system whose modes give none: no poles, or integrators alone
 
 
@@ -67,11 +67,11 @@ def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray
     moving = values[values != 0.0]
     end = _default_horizon(moving) if horizon is None else float(horizon)
     with np.errstate(divide="ignore", over="ignore"):
-        seen = np.abs(moving[SETTLED / np.abs(moving.real) > end / SEEN])
+        seen = np.abs(moving[SETTLING_TIME_CONSTANTS / np.abs(moving.real) > end / SEEN])
     fastest = float(seen.max(initial=0.0))
-    if horizon is None and end * fastest > COARSE * MOST_STEPS:
-        end = COARSE * MOST_STEPS / fastest
-    steps = int(np.clip(np.ceil(end * fastest / FINE), FEWEST_STEPS, MOST_STEPS))
+    if horizon is None and end * fastest > COARSEST_STEP * MOST_TIME_STEPS:
+        end = COARSEST_STEP * MOST_TIME_STEPS / fastest
+    steps = int(np.clip(np.ceil(end * fastest / FINE_STEP), FEWEST_STEPS, MOST_TIME_STEPS))
     return np.linspace(0.0, end, steps + 1)
 
 
@@ -113,8 +113,8 @@ def _default_horizon(moving: ComplexArray) -> float:
     if moving.size == 0:
         return NO_SCALE
     with np.errstate(divide="ignore", over="ignore"):
-        settled = SETTLED / np.abs(moving.real)
+        settled = SETTLING_TIME_CONSTANTS / np.abs(moving.real)
         swung = MOST_PERIODS * 2.0 * np.pi / np.abs(moving.imag)
     end = float(np.minimum(settled, swung).max())
     growth = float(moving.real.max())
-    return min(end, SETTLED / growth) if growth > 0.0 else end
+    return min(end, SETTLING_TIME_CONSTANTS / growth) if growth > 0.0 else end

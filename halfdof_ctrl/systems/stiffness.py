@@ -35,7 +35,7 @@ from halfdof_ctrl.systems.seen_modes import Response, seen_poles
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
 
 LINEAR_MARGIN = 4.0  #: evenly spread frequencies reach this factor above the modes
-KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
+TRANSMISSIBILITY_KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
 
 
 def dynamic_stiffness(model: SecondOrderModel, dof: Names, s: npt.ArrayLike) -> ComplexArray:
@@ -127,8 +127,8 @@ def transmissibility(
     >>> complex(transmissibility(model, "mass", "foot", 1.0, kind="force"))
     (0.8+0j)
     """
-    if kind not in KINDS:
-        msg = f"kind must be {' or '.join(KINDS)}, not {kind!r}."
+    if kind not in TRANSMISSIBILITY_KINDS:
+        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
         raise ParameterError(msg, parameter="kind", value=kind)
     if kind == "motion":
         _require_single(to, "to", kind)

@@ -14,11 +14,14 @@ from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
     InconsistentStateError,
+    LawError,
     LostDigitsWarning,
     MatrixError,
     MissingExtraError,
     ModelSizeError,
     NearlyMasslessWarning,
+    NoAnswerError,
+    NoStateSpaceError,
     ParameterError,
     SignalNameError,
     SingularLeadingMatrixError,
@@ -31,6 +34,8 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.files.naming import naming_the_file
 
 EXAMPLES: list[HalfdofError] = [
+    LawError("bounded", element="damper 1 (coulomb)", dofs=("y2",)),
+    NoAnswerError("stops", element="damper 1 (table)", dofs=("y2",), time=0.5, force=7.0, state=(0.0, 1.0)),
     MatrixError("K is empty", matrix="K"),
     ComplexModelError("K is complex", matrices=("K", "C")),
     SignalNameError("no such name", names=("a",)),
@@ -69,7 +74,7 @@ def test_error_survives_pickling(error: HalfdofError) -> None:
 def test_every_error_has_an_example_above() -> None:
     """No child of the base class is forgotten."""
     public = {kind for _, kind in inspect.getmembers(errors, inspect.isclass) if issubclass(kind, HalfdofError)}
-    assert public - {HalfdofError} == {type(error) for error in EXAMPLES}
+    assert public - {HalfdofError, NoStateSpaceError} == {type(error) for error in EXAMPLES}
 
 
 @pytest.mark.parametrize("kind", [NearlyMasslessWarning, CloseDecisionWarning, LostDigitsWarning])

@@ -143,7 +143,9 @@ def test_repr_shows_gain_labels_and_poles() -> None:
 @pytest.mark.parametrize("method", SOLVERS)
 def test_rigid_motion_without_weight_is_refused(method: Literal["scipy", "slycot"]) -> None:
     """Weights on a velocity alone leave the rigid displacement at an eigenvalue zero, whatever the solver says."""
-    with pytest.raises(StabilizationError, match=r"the cost sees it by .* not told from nothing.*displacement of DOF [ab]") as caught:
+    with pytest.raises(
+        StabilizationError, match=r"the cost sees it by .* not told from nothing.*displacement of DOF [ab]"
+    ) as caught:
         lqr(two_masses("F_a"), velocity={"a": 1.0}, effort={"F_a": 1.0}, method=method)
     assert caught.value.eigenvalue == 0.0
     assert caught.value.quantity in {"a", "b"}
@@ -151,7 +153,9 @@ def test_rigid_motion_without_weight_is_refused(method: Literal["scipy", "slycot
 
 def test_unreached_mode_is_refused_with_the_force_that_reaches_it() -> None:
     """A force on a static node apart moves none of the masses; a force on one of them would."""
-    with pytest.raises(StabilizationError, match=r"the inputs reach it by .* not told from nothing.*input F_[ab]") as caught:
+    with pytest.raises(
+        StabilizationError, match=r"the inputs reach it by .* not told from nothing.*input F_[ab]"
+    ) as caught:
         lqr(two_masses("F_s"), displacement={"b": 1.0}, effort={"F_s": 1.0})
     assert caught.value.quantity in {"F_a", "F_b"}
 

@@ -65,7 +65,8 @@ def test_many_small_blocks_are_counted_one_by_one(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("halfdof_ctrl.files.definiteness.BATCH", 20)
     rng = np.random.default_rng(5)
     blocks: list[npt.NDArray[np.float64]] = [np.ones((k, k)) for k in rng.integers(1, 5, 60)]
-    matrix = csc_array(block_diag([*blocks, np.zeros((3, 3)), -np.ones((2, 2))], format="csc"))
+    blocks += [np.zeros((3, 3)), -np.ones((2, 2))]
+    matrix = csc_array(block_diag([csc_array(block) for block in blocks], format="csc"))
     shuffled = rng.permutation(matrix.shape[0])
     found = inertia(csc_array(csc_array(matrix[shuffled])[:, shuffled]))
     assert counts(found) == (60, 1, matrix.shape[0] - 61, 0)
@@ -74,7 +75,7 @@ def test_many_small_blocks_are_counted_one_by_one(monkeypatch: pytest.MonkeyPatc
 
 def test_components_above_the_limit_stay_unknown() -> None:
     """And say so, rather than taking long."""
-    found = inertia(csc_array(block_diag([chain(400, 1.0), np.eye(2)], format="csc")), largest=399)
+    found = inertia(csc_array(block_diag([chain(400, 1.0), eye_array(2)], format="csc")), largest=399)
     assert counts(found) == (2, 0, 0, 400)
     assert (found.rank, found.in_words) == (None, "not determined")
 

@@ -9,16 +9,15 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import pytest
-import scipy.io
 import scipy.linalg
 import scipy.sparse.linalg
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, descriptor_response, inspect_files, load_model, mech2ss, mechss
-from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofWarning, ImportedModelWarning
+from support import exported_files as exported
 from support.fe_files import (
     CHAIN,
-    EXPORTS,
     NAMES,
     C,
     K,
@@ -32,7 +31,6 @@ from support.fe_files import (
     output4_text,
 )
 
-REAL_FILES = pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
 SAME = 1e-9  #: relative, of frequencies; the files have 10 to 16 digits and both sides read all of them
 
 
@@ -75,14 +73,13 @@ def in_folder(folder: Path) -> Iterator[None]:
         os.chdir(before)
 
 
-@REAL_FILES
 @pytest.mark.parametrize("number", ["01", "03", "12", "13"])
-def test_real_structures_have_the_frequencies_of_an_independent_solver(number: str) -> None:
-    """scipy.io.mmread and dense linear algebra against the model and a sparse solver: ten eigenvalues."""
-    folder = EXPORTS / "matrix-market"
+def test_structures_have_the_frequencies_of_an_independent_solver(tmp_path: Path, number: str) -> None:
+    """Dense linear algebra, with what scipy was given to write, against the model and a sparse solver: ten of them."""
     with pytest.warns(ImportedModelWarning, match="no damping C in"):
-        model = load_model(folder / f"bcsstk{number}.mtx")
-    mass, stiffness = (dense(scipy.io.mmread(folder / f"bcsst{kind}{number}.mtx")) for kind in "mk")
+        model = load_model(exported.write_structure(tmp_path, number)[0])
+    structure = exported.STRUCTURES[number]
+    stiffness, mass = dense(structure.K), dense(structure.M)
     np.testing.assert_array_equal(dense(model.M), mass)
     np.testing.assert_array_equal(dense(model.K), stiffness)
     found = scipy.sparse.linalg.eigsh(
@@ -92,23 +89,22 @@ def test_real_structures_have_the_frequencies_of_an_independent_solver(number: s
     np.testing.assert_allclose(np.sort(found), expected, rtol=SAME)
 
 
-@REAL_FILES
 @pytest.mark.parametrize("number", ["01", "03"])
-def test_state_spaces_of_real_structures_have_these_frequencies(number: str) -> None:
+def test_state_spaces_of_structures_have_these_frequencies(tmp_path: Path, number: str) -> None:
     """The poles of the reduced model, 24 and 40 DOFs being without mass, are i times the roots of the eigenvalues."""
-    folder = EXPORTS / "matrix-market"
-    model = load_model({"K": folder / f"bcsstk{number}.mtx", "M": folder / f"bcsstm{number}.mtx"})
+    model = load_model(dict(zip("KM", exported.write_structure(tmp_path, number), strict=True)))
     poles = np.sort(np.abs(mech2ss(model.select(model.inputs[0], model.outputs[0])).poles()))[::2][:10]
     np.testing.assert_allclose(poles, np.sqrt(squared_frequencies(dense(model.M), dense(model.K))), rtol=1e-7)
 
 
-@REAL_FILES
 @pytest.mark.parametrize(
-    ("number", "inertial", "static"), [("01", 24, 24), ("03", 72, 40), ("12", 1473, 0), ("13", 1241, 762)]
+    ("number", "inertial", "static"), [("01", 24, 24), ("03", 72, 40), ("12", 420, 0), ("13", 90, 342)]
 )
-def test_reports_on_real_structures_count_what_is_known_of_them(number: str, inertial: int, static: int) -> None:
-    """DOFs without mass as the collection describes them; stiffness definite, mass semidefinite."""
-    report = inspect_files(EXPORTS / "matrix-market" / f"bcsstk{number}.mtx")
+def test_reports_on_structures_count_what_is_known_of_them(
+    tmp_path: Path, number: str, inertial: int, static: int
+) -> None:
+    """DOFs without mass as they were built; stiffness definite, mass semidefinite."""
+    report = inspect_files(exported.write_structure(tmp_path, number)[0])
     assert (report.n_inertial, report.n_half, report.n_static) == (inertial, 0, static)
     mass, stiffness = report.matrices
     assert (mass.inertia.rank, stiffness.inertia.rank) == (inertial, report.n_dofs)
@@ -116,16 +112,14 @@ def test_reports_on_real_structures_count_what_is_known_of_them(number: str, ine
     assert report.warnings == ()
 
 
-@REAL_FILES
-def test_a_real_superelement_has_named_dofs_and_the_frequencies_of_its_op4_file() -> None:
-    """OUTPUT4 with the names of its punch file: 32 DOFs, six rigid motions, the rest as pyyeti's matrices give them."""
-    op4 = pytest.importorskip("pyyeti.nastran.op4")
-    path = EXPORTS / "nastran" / "inboard.op4"
+def test_a_superelement_has_named_dofs_and_the_frequencies_of_its_op4_file() -> None:
+    """OUTPUT4 with the names of its punch file: 32 DOFs, six rigid motions, the rest as the matrices written give."""
+    path = exported.DATA / "superelement.op4"
     with pytest.warns(ImportedModelWarning, match="no damping C"):
         model = load_model(path)
     assert model.dofs[:6] == ("n3_u1", "n3_u2", "n3_u3", "n3_r1", "n3_r2", "n3_r3")
-    assert model.dofs[-1] == "n2995008"
-    theirs = op4.read(str(path))
+    assert model.dofs == exported.SUPERELEMENT_DOFS
+    theirs = exported.superelement()
     ours = np.sort(scipy.linalg.eigvalsh(dense(model.K), dense(model.M) + 1e-9 * np.eye(32)))[6:16]
     other = np.sort(scipy.linalg.eigvalsh(theirs["kxx"], theirs["mxx"] + 1e-9 * np.eye(32)))[6:16]
     np.testing.assert_allclose(ours, other, rtol=SAME)
@@ -231,7 +225,7 @@ def test_missing_damping_is_said_unless_the_files_were_chosen_by_hand(tmp_path: 
     with pytest.warns(ImportedModelWarning, match=r"K\.mtx: no damping C in K\.mtx, M\.mtx, so it is taken as zero"):
         load_model(tmp_path / "K.mtx")
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", HalfdofWarning)
         load_model([tmp_path / "K.mtx", tmp_path / "M.mtx"])
 
 
@@ -245,8 +239,11 @@ def test_warnings_of_the_report_are_given_on_loading(tmp_path: Path) -> None:
 
 
 def test_a_half_in_a_container_is_completed_on_request(tmp_path: Path) -> None:
-    """Dense or sparse; without the request it is taken as it is."""
-    np.savez(tmp_path / "a.npz", K=np.tril(K))
+    """Dense or sparse; without the request it is taken as it is, and told."""
+    np.savez(tmp_path / "a.npz", M=M, C=C, K=np.tril(K))
+    with pytest.warns(ImportedModelWarning, match="half of it seems to be missing"):
+        load_model(tmp_path / "a.npz")
+    warnings.simplefilter("ignore", ImportedModelWarning)
     np.testing.assert_array_equal(dense(load_model(tmp_path / "a.npz").K), np.tril(K))
     np.testing.assert_array_equal(dense(load_model(tmp_path / "a.npz", triangle="lower").K), K)
     with pytest.raises(FileFormatError, match=r"a\.npz: triangle='upper'"):
@@ -275,7 +272,7 @@ def test_no_stiffness_and_no_file_are_refused(tmp_path: Path, names: list[str], 
 def loaded(path: Path) -> SecondOrderModel | str:
     """Load a model, or give its refusal or the word that something is missing, and let nothing else happen."""
     with warnings.catch_warnings():
-        warnings.simplefilter("error")
+        warnings.simplefilter("error", HalfdofWarning)
         warnings.filterwarnings("ignore", "(?!.*(last number|no mass|no damping))", ImportedModelWarning)
         try:
             return load_model(path)
@@ -316,22 +313,15 @@ def test_a_damaged_file_loads_or_is_refused(tmp_path: Path, name: str) -> None:
     assert refused > 20
 
 
-@REAL_FILES
 @pytest.mark.parametrize(
     "name",
-    [
-        "matrix-market/bcsstk01.mtx",
-        "nastran/inboard.op4",
-        "nastran/ascii_fabiola.op4",
-        "nastran/binary_fabiola.op4",
-        "nastran/matrix_factory.pch",
-        "nastran/inboard.pch",
-    ],
+    ["bcsstk01.mtx", "superelement.op4", "single_text.op4", "single_binary.op4", "forms.pch", "superelement.pch"],
 )
-def test_real_files_that_are_damaged_are_refused_or_read(tmp_path: Path, name: str) -> None:
+def test_files_of_other_programs_that_are_damaged_are_refused_or_read(tmp_path: Path, name: str) -> None:
     """Cut and changed at random, 60 times each, in a seeded loop."""
-    content = (EXPORTS / name).read_bytes()
-    path = tmp_path / Path(name).name
+    content = exported.content(name, tmp_path)
+    path = tmp_path / "damaged" / name
+    path.parent.mkdir()
     rng = np.random.default_rng(8)
     for _ in range(60):
         damaged = bytearray(content)

@@ -36,10 +36,10 @@ def test_the_table_shows_each_matrix_and_what_is_missing(tmp_path: Path) -> None
         "     from           size   nonzero  stored            symmetry   definiteness",
         "  M  job_MASS1.mtx  3 x 3  2        diagonal          symmetric  positive semidefinite, rank 2",
         "  K  job_STIF1.mtx  3 x 3  7        lower, completed  symmetric  positive definite, rank 3",
+        "  files: job_STIF1.mtx, job_MASS1.mtx",
         "  C  no damping in the files: taken as zero",
         "  DOFs by null columns: 2 inertial, 0 half, 1 static",
         "  sum of M: 5 along u1",
-        "  files: job_STIF1.mtx, job_MASS1.mtx",
         "  note: 1 DOFs are in K but not in M",
     ]
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from halfdof_ctrl.files.roles import nastran_letter, role_of, siblings, with_labels
+from halfdof_ctrl.files.roles import nastran_letter, role_of, roles_in, siblings, with_labels
 
 
 @pytest.mark.parametrize(
@@ -90,3 +90,33 @@ def test_label_files_have_the_same_name(tmp_path: Path) -> None:
     found = with_labels([tmp_path / "stiff.matrix", tmp_path / "se.op4"])
     assert [path.name for path in found] == ["stiff.matrix", "se.op4", "STIFF.MAPPING", "se.pch"]
     assert with_labels([tmp_path / "nowhere" / "a.mtx"]) == [tmp_path / "nowhere" / "a.mtx"]
+
+
+@pytest.mark.parametrize(
+    ("name", "letter"), [("KMatrixTMD.mtx", "K"), ("MMatrixTMD.mtx", "M"), ("rotorDiscSTIF1.mtx", "K"), ("b.mas", "M")]
+)
+def test_a_word_of_its_own_in_capitals_tells_the_matrix(name: str, letter: str) -> None:
+    """Wherever in the name it stands."""
+    role = role_of(Path(name))
+    assert role is not None
+    assert role.letter == letter
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("KMatrixTMD.mtx", "MMatrixTMD.mtx", "CMatrixTMD.mtx"),
+        ("rotorDiscSTIF1.mtx", "rotorDiscMASS1.mtx", "rotorDiscDMPV1.mtx"),
+        ("beamstiffness.txt", "beammass.txt", "beamdamping.txt"),
+        ("2Stiffness_of_car.csv", "2Mass_of_car.csv", "2Damping_of_car.csv"),
+        ("MassSpring_K.mtx", "MassSpring_M.mtx", "MassSpring_C.mtx"),
+    ],
+)
+def test_names_that_differ_in_the_word_alone_are_siblings(tmp_path: Path, names: tuple[str, ...]) -> None:
+    """From each of them, beside others."""
+    for name in (*names, "KMatrixABC.mtx", "othermass.txt", "massive.csv"):
+        (tmp_path / name).touch()
+    for name in names:
+        assert sorted(path.name for path in siblings(tmp_path / name)) == sorted(set(names) - {name})
+    roles = roles_in([tmp_path / name for name in names])
+    assert [role.letter for role in roles.values()] == ["K", "M", "C"]

@@ -26,7 +26,8 @@ MOUNT, CANTILEVER = CASES.values()
 IMPLICIT = EXAMPLE.SOLVERS[1:]
 
 TWO_DIGITS = 0.06  #: relative, of errors printed with two digits
-STEP_CONTROL = 0.2  #: relative, of counts that hang on rounding in the step control of a solver
+STEP_CONTROL = 0.2  #: relative, of counts in which rounding decides some step of a solver, but not most
+DOUBLING, TRIPLING = 1.6, 3.4  #: about, from decade to decade of counts in which rounding decides most steps
 HALF_UNIT = 5e-16  #: relative, of a number written with 16 digits
 FIRST_ORDER = 1e-3  #: relative, of a perturbation of 1e-5 whose second order is left out
 ROUNDING = 1e-13  #: relative, of eigenvalues and responses of these small models
@@ -171,6 +172,30 @@ def test_guyan_reduction_is_exact_where_damping_is_proportional_to_stiffness() -
     assert len(values[0]) == len(values[1]) + 2
     assert_allclose(np.sort(np.abs(values[0] + 16.0))[:2], 0.0, atol=1e-10)
     assert EXAMPLE.eigenvalue_error(values[0], values[1]) < ROUNDING
+
+
+@pytest.mark.parametrize("solver", IMPLICIT)
+def test_work_of_implicit_solvers_grows_while_they_resolve_an_undamped_vibration(solver: str) -> None:
+    """From 1e-2 to 1e-4, however rounding falls."""
+    (low, high) = (work(CANTILEVER, epsilon, solver) for epsilon in (1e-2, 1e-4))
+    assert DOUBLING < np.sqrt(high / low) < TRIPLING
+    assert "about doubles or triples with each decade" in TEXT
+
+
+@pytest.mark.parametrize(
+    ("solver", "count", "text"),
+    [
+        ("RK45", 10472, "10472"),
+        ("BDF", 1000, "1000"),
+        ("BDF", 1358, "> 1000"),
+        ("BDF", 2500, "> 2000"),
+        ("Radau", 14169, "> 10000"),
+        ("LSODA", 20001, "> 20000"),
+    ],
+)
+def test_counts_that_hang_on_rounding_are_printed_as_what_they_exceed(solver: str, count: int, text: str) -> None:
+    """By the largest of 1, 2, 5 times a power of ten below four fifths of the count."""
+    assert EXAMPLE.printed_count(solver, count) == text
 
 
 def test_work_of_an_explicit_solver_grows_as_one_over_epsilon() -> None:

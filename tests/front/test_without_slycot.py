@@ -17,6 +17,9 @@ import json, sys, warnings
 if "without" in sys.argv:
     sys.modules["slycot"] = None
 warnings.simplefilter("error")
+for kind in (DeprecationWarning, PendingDeprecationWarning, FutureWarning):  # in other packages' code, as in the suite
+    warnings.simplefilter("ignore", kind)
+warnings.filterwarnings("error", module="halfdof_ctrl|__main__")
 import numpy as np
 import control
 import halfdof_ctrl as hd

@@ -12,6 +12,7 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl import mechss
 from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.model import sparse_evaluation
 from halfdof_ctrl.model.evaluation import quadratic_transfer
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
@@ -69,7 +70,7 @@ def test_every_way_of_pivoting_gives_the_values(way: int, monkeypatch: pytest.Mo
     """Also where the first way would have done."""
     model = space_frame(3, 2, 3, 2).model().select(["F_q0", "F_q3"], ["q0", "q9"])
     desired = model.as_dense()(POINTS)
-    monkeypatch.setattr(sparse_evaluation, "PIVOTINGS", sparse_evaluation.PIVOTINGS[way:])
+    monkeypatch.setattr(sparse_evaluation, "PIVOTINGS", PIVOTINGS[way:])
     assert_allclose(model(POINTS), desired, rtol=1e-9)
 
 

@@ -15,6 +15,7 @@ from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 OMEGA = np.geomspace(1.0, 50.0, 9)
+LAST_DIGITS = 1e-13  #: what is computed twice in the same way; processors differ in the last digits of other strides
 ROUNDING = 1e-12  #: in degrees
 
 
@@ -57,7 +58,7 @@ def test_each_case_is_a_curve_in_order() -> None:
     response = np.asarray(result.response)[:, 0, 0]
     for place, (above, below) in enumerate(zip(cplt.lines[0, 0], cplt.lines[1, 0], strict=True)):
         assert_array_equal(above.get_xdata(), OMEGA)
-        assert_array_equal(above.get_ydata(), np.abs(response[place]))
+        assert_allclose(above.get_ydata(), np.abs(response[place]), rtol=LAST_DIGITS)
         assert_allclose(below.get_ydata(), np.degrees(continuous_phase(response[place])), rtol=ROUNDING)
     assert legend_texts(cplt) == ["C_h = 100", "C_h = 300", "C_h = 900"]
     assert colour_bar(cplt) is None
@@ -110,7 +111,7 @@ def test_some_cases_are_picked_by_value() -> None:
     result = mounts(C_h=[0.1 + 0.2, 300], K_v=[250, 500, 1000])
     cplt = sweep_plot(result, at={"C_h": 0.3})
     assert legend_texts(cplt) == ["K_v = 250", "K_v = 500", "K_v = 1000"]
-    assert_array_equal(cplt.lines[0, 0][1].get_ydata(), np.abs(np.asarray(result.response)[0, 1, 0, 0]))
+    assert_allclose(cplt.lines[0, 0][1].get_ydata(), np.abs(np.asarray(result.response)[0, 1, 0, 0]), rtol=LAST_DIGITS)
 
 
 def test_values_that_are_no_numbers_have_a_legend() -> None:

@@ -18,7 +18,7 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
 )
 from halfdof_ctrl.reduction.dense.partition import DofPartition
-from support import exact
+from support import exact, outcome
 from support.comparison import POINTS, assert_same_transfer, response
 from support.structures import (
     Structure,
@@ -120,7 +120,7 @@ def test_passive_order_is_rank_m_plus_rank_m_c(structure: Structure) -> None:
     assume(exact.rank(*structure.matrices) == structure.size)
     order = exact.rank(structure.M) + exact.rank(structure.M, structure.C)
     assert exact.order(*structure.matrices) == order
-    reduction = exact_reduction(structure.model())
+    reduction = outcome.reduced(structure.model())
     assert reduction.order == order
     assert reduction.index <= 1
     assert exact.growth(structure.model()).max() <= 0

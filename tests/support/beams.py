@@ -91,3 +91,25 @@ def _ball_value(model: SecondOrderModel, s: complex) -> complex:
 
 def _ball_matrix(matrix: npt.ArrayLike) -> flint.acb_mat:
     return flint.acb_mat(np.asarray(matrix, dtype=float).tolist())
+
+
+def plane_frame(nodes: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Give M and K of a free polygon of steel bars in the plane: two displacements and a rotation at each node."""
+    places = np.asarray(nodes, dtype=float)
+    M, K = np.zeros((2, 3 * len(places), 3 * len(places)))
+    bending = [1, 2, 4, 5]
+    for e, along in enumerate(np.diff(places, axis=0)):
+        length = float(np.hypot(*along))
+        cosine, sine = along / length
+        turn = np.kron(np.eye(2), [[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        m, k = beam_matrices(1, clamped=False)
+        own_m, own_k = np.zeros((2, 6, 6))
+        size = np.array([1.0, length, 1.0, length])
+        own_m[np.ix_(bending, bending)] = 7.8 * length * size[:, None] * m * size
+        own_k[np.ix_(bending, bending)] = 2e4 / length**3 * size[:, None] * k * size
+        own_m[np.ix_([0, 3], [0, 3])] = 7.8 * length / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
+        own_k[np.ix_([0, 3], [0, 3])] = 2e8 / length * np.array([[1.0, -1.0], [-1.0, 1.0]])
+        part = slice(3 * e, 3 * e + 6)
+        M[part, part] += turn.T @ own_m @ turn
+        K[part, part] += turn.T @ own_k @ turn
+    return M, K

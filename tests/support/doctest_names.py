@@ -1,6 +1,6 @@
 """Pytest plugin: names that the docstring examples of the package use without importing them.
 
-Examples see the globals of their module; what stands above it (`mech2ss` in `model`, say) comes from here.
+Examples see the globals of their module; what stands above it (`mech2ss` in `second_order`, say) comes from here.
 Loaded by ``-p support.doctest_names`` with ``pythonpath = ["tests"]``, since no conftest.py lies beside the package.
 """
 

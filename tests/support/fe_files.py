@@ -5,7 +5,6 @@ damper of 0.5 between nodes 2 and 3.
 """
 
 import struct
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,6 @@ C = np.array([[0.0, 0.0, 0.0], [0.0, 0.5, -0.5], [0.0, -0.5, 0.5]])
 K = np.array([[6.0, -2.0, 0.0], [-2.0, 3.0, -1.0], [0.0, -1.0, 1.0]])
 CHAIN = {"M": M, "C": C, "K": K}
 NAMES = ("n1_u1", "n2_u1", "n3_u1")
-ROOT = Path(__file__).parents[2]
-EXPORTS = ROOT.parent / "shared" / "exports"  #: files that programs wrote; tests skip where there are none
 
 
 def triangle(matrix: Array, side: str) -> list[tuple[int, int, float]]:

@@ -5,9 +5,11 @@ import numpy.typing as npt
 from hypothesis import strategies as st
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel
+from halfdof_ctrl.reduction.deflation.method import Deflation
 from halfdof_ctrl.reduction.deflation.realization import Realization, realized
 from halfdof_ctrl.reduction.deflation.relaxation import relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
+from halfdof_ctrl.reduction.dense.method import SingleSolve
 from halfdof_ctrl.reduction.method.signals import StateEquations
 from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 from support import exact
@@ -25,7 +27,7 @@ def system_of(P: npt.ArrayLike) -> RowSystem:
     coefficients = np.asarray(P, dtype=float)
     force = np.zeros_like(coefficients)
     force[0] = np.eye(coefficients.shape[1])
-    return scaled_rows(coefficients, force)[0]
+    return RowSystem.scaled(scaled_rows(coefficients, force)[0])
 
 
 def drawn(seed: int, size: int) -> FloatArray:
@@ -43,10 +45,10 @@ def rational_coefficients(matrix: FloatArray) -> list[object]:
 
 def realization(model: SecondOrderModel) -> tuple[Realization, Units]:
     """Relax and solve a model's equations."""
-    system, units = scaled_rows(
+    rows, units = scaled_rows(
         np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
     )
-    result = relaxed(system, USUAL)
+    result = relaxed(RowSystem.scaled(rows), USUAL)
     assert result.offsets is not None
     return realized(result.system, result.offsets, USUAL), units
 
@@ -63,5 +65,5 @@ def response(equations: StateEquations, points: ComplexArray = POINTS) -> Comple
 
 def dense(reduction: ExactReduction) -> StateEquations:
     """Give the state equations of a model that is not sparse."""
-    assert isinstance(reduction.equations, StateEquations)
-    return reduction.equations
+    assert isinstance(reduction.solution, SingleSolve | Deflation)
+    return reduction.solution.equations

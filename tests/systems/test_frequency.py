@@ -1,7 +1,5 @@
 """Frequency responses as `control.FrequencyResponseData`: the very points, the names, the values of the peers."""
 
-import warnings
-
 import control
 import numpy as np
 import numpy.typing as npt
@@ -146,11 +144,9 @@ def test_sharp_resonance_is_met_by_the_default_grid() -> None:
 
 
 def test_default_grid_of_an_undamped_model_gives_no_warning() -> None:
-    """Poles on the axis are met by the grid or not, without a warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        descriptor_response(mechss(np.eye(2), None, np.diag([1.0, 4.0])))
-        frequency_response(mechss(np.eye(2), None, np.diag([1.0, 4.0])))
+    """Poles on the axis are met by the grid or not, without a warning, which would fail as any does."""
+    descriptor_response(mechss(np.eye(2), None, np.diag([1.0, 4.0])))
+    frequency_response(mechss(np.eye(2), None, np.diag([1.0, 4.0])))
 
 
 @pytest.mark.parametrize("omega", [[], [-1.0], [np.nan], [np.inf], [[1.0, 2.0]], [1.0, -1e-9]])

@@ -1,7 +1,6 @@
 """From a model to `control.StateSpace`: labels, outputs with direct terms, improper pairs by name."""
 
 import copy
-import warnings
 
 import control
 import numpy as np
@@ -151,10 +150,8 @@ def test_bad_matrices_are_refused_at_the_same_door() -> None:
 
 
 def test_massless_springs_become_a_static_gain() -> None:
-    """No states, D is the flexibility, and no warning from python-control on the way."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        sys = mech2ss(None, None, [[4]])
+    """No states, D is the flexibility, and no warning on the way, which would fail as any does."""
+    sys = mech2ss(None, None, [[4]])
     assert sys.nstates == 0
     assert_array_equal(sys.D, [[0.25]])
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from numpy.testing import assert_allclose
 
 from halfdof_ctrl import mech2ss, mechss
-from halfdof_ctrl.systems.step_times import MOST_STEPS, relevant_poles, step_times
+from halfdof_ctrl.systems.step_times import MOST_TIME_STEPS, relevant_poles, step_times
 
 ROUNDING = 1e-12  #: curve and markers come by different routes; both are exact to a few digits less than that
 
@@ -38,7 +38,7 @@ def test_oscillation_that_lasts_is_resolved_beside_a_slow_mode() -> None:
     time = step_times([-1.0, 200j, -200j])
     assert time[1] * 200.0 <= 0.2 + 1e-12
     time = step_times([-1.0, 1e5j, -1e5j])
-    assert time.size == MOST_STEPS + 1
+    assert time.size == MOST_TIME_STEPS + 1
     assert time[1] * 1e5 <= 1.0 + 1e-12
 
 
@@ -58,6 +58,6 @@ def test_rounded_poles_of_a_free_body_count_as_integrators() -> None:
 def test_times_are_always_finite_and_few(poles: list[complex]) -> None:
     """Any poles give 500 to 10000 equal steps of positive length."""
     time = step_times(poles)
-    assert 501 <= time.size <= MOST_STEPS + 1
+    assert 501 <= time.size <= MOST_TIME_STEPS + 1
     assert np.isfinite(time).all()
     assert time[1] > 0.0

@@ -23,6 +23,7 @@ from scipy.sparse.linalg import LinearOperator, onenormest, splu
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, column_of_entries, largest_by_row_and_column
 from halfdof_ctrl.base.sparse_products import exact_residual, times
+from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
@@ -34,6 +35,8 @@ SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal
 SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
 SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
+DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
+CHEAP = 200  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
@@ -56,13 +59,19 @@ class SparseLU:
         """Equilibrate, factorize and estimate the condition.
 
         Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
-        logarithms of its entries, which does not depend on units, and judged again.
+        logarithms of its entries, which does not depend on units, and judged again; a small one that looks ill
+        conditioned is scaled as the dense leading matrix is.
         """
         first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
+        if matrix.shape[0] <= CHEAP and first.rcond < DOUBTFUL:
+            best = LeadingMatrix.factorized(matrix.toarray())
+            if best.rows is not None and best.columns is not None:
+                return _better(first, cls._scaled(matrix, best.rows, best.columns))
         if not first.is_singular:
             return first
-        second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
-        return second if second.rcond > first.rcond else first
+        return _better(
+            first, cls._scaled(matrix, *[np.exp2(np.round(log)) for log in evening_logs(matrix, settled=SETTLED)])
+        )
 
     @classmethod
     def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
@@ -117,6 +126,10 @@ class SparseLU:
         rest = exact_residual(self.scaled, right, solution, transposed=transposed == "N")
         correction = self.factors.solve(rest, trans=transposed)
         return np.asarray(solution + correction.astype(np.longdouble if transposed == "N" else float))
+
+
+def _better(one: SparseLU, other: SparseLU) -> SparseLU:
+    return other if other.rcond > one.rcond else one
 
 
 def largest_of_columns(matrix: FloatArray) -> FloatArray:
@@ -197,13 +210,21 @@ def _attempt(matrix: SparseMatrix, ordering: Any, threshold: float) -> Any:  # n
 
 
 def _reciprocal_condition(scaled: SparseMatrix, factors: Any) -> float:  # noqa: ANN401  # SuperLU has no public type
-    """Estimate the reciprocal 1-norm condition number (N. J. Higham and F. Tisseur, 2000)."""
+    """Estimate the reciprocal 1-norm condition number.
+
+    By the iteration of N. J. Higham and F. Tisseur (2000) with one column, and, as LAPACK does, by a vector of rising
+    size and alternating sign: what is nearly singular by cancellation may be invisible to the constant vector with
+    which the iteration begins.
+    """
+    n = scaled.shape[0]
     inverse = LinearOperator(
         scaled.shape,
         matvec=lambda vector: factors.solve(vector.ravel(), trans="T"),
         rmatvec=lambda vector: factors.solve(vector.ravel()),
         dtype=np.float64,
     )
+    alternating = (-1.0) ** np.arange(n) * (1.0 + np.arange(n) / max(n - 1, 1))
     with np.errstate(all="ignore"):
-        largest = float(abs(scaled).sum(axis=0).max()) * float(onenormest(inverse, t=1))
+        second = 2.0 * float(np.abs(factors.solve(alternating, trans="T")).sum()) / (3.0 * n)
+        largest = float(abs(scaled).sum(axis=0).max()) * max(float(onenormest(inverse, t=1)), second)
     return 1.0 / largest if np.isfinite(largest) and largest > 0.0 else 0.0

@@ -5,14 +5,13 @@ does not, or where a pencil is called singular whose P(s) is not, the decisions 
 caution about rounding errors. If none passes, the model is refused.
 """
 
-import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, IndexArray, Matrix, read_only, unit_matrix, zero_matrix
-from halfdof_ctrl.base.errors import CloseDecisionWarning, SingularPencilError, UncertainRankError, callers_level
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilError, UncertainRankError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
@@ -23,11 +22,12 @@ from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_u
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
-from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.method.evidence import RankDecision, warn_of_close_decisions, warn_of_lost_digits
+from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import Loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil, scaled_pencil
-from halfdof_ctrl.reduction.method.signals import Rounding, StateEquations, output_signal, without_rounding
+from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
@@ -40,18 +40,98 @@ TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is 
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Deflated:
-    """A model after deflation."""
+class Deflation:
+    """A reduction by deflation: a `ReductionMethod`."""
 
-    selection: StateSelection
+    model: SecondOrderModel
+    coordinates: StateSelection
     equations: StateEquations
     rounding: Rounding
-    rcond: float  #: smallest reciprocal condition number of the square systems (18)
-    loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
-    certified: bool  #: whether (19) holds, as it need not where `tol` was given
+    evidence: Evidence  #: `rcond` is the smallest of the square systems (18)
+    tol: float | None
+
+    @property
+    def name(self) -> MethodName:
+        """`deflation`."""
+        return "deflation"
+
+    @property
+    def A(self) -> FloatArray:  # noqa: N802
+        """(N, N) state matrix."""
+        return self.equations.A
+
+    @property
+    def B(self) -> FloatArray:  # noqa: N802
+        """(N, m) input matrix."""
+        return self.equations.B
+
+    @property
+    def shift(self) -> tuple[FloatArray, ...]:
+        """E_0, E_1, ... of equation (5)."""
+        return self.equations.shift
+
+    @property
+    def input_derivatives(self) -> int:
+        """How many derivatives of the inputs the velocities may contain."""
+        return len(self.equations.displacement.U)
+
+    def index(self) -> int:
+        """Return the index of the pencil (8) from the growth of its inverse.
+
+        With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass,
+        the transfer function grows as the inverse of (8) does.
+        """
+        probe = _probe(self.model if self.tol is None else without_light_masses(self.model, self.tol))
+        result = deflated(probe, self.tol)
+        grown = output_signal(probe, result.equations, lambda: result.rounding)
+        return len(without_rounding(probe, grown, result.rounding).U)
+
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, lambda: self.rounding)
+
+    def motion(self, derivative: int) -> Signal:
+        """Return a derivative of all DOFs."""
+        return self.equations.motion(derivative)
+
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return a derivative of all DOFs for given states and inputs."""
+        return self.equations.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
+
+    def decisions(self) -> tuple[RankDecision, ...]:
+        """Return the decisions about blocks of J, equation (16)."""
+        return self.evidence.decisions
+
+    def inverse_rows(self) -> FloatArray:
+        """Refuse: W is singular.
+
+        Raises
+        ------
+        SingularLeadingMatrixError
+        """
+        msg = "W of equation (2) is singular, so that alpha and gamma, the rows of its inverse, do not exist."
+        raise SingularLeadingMatrixError(msg, dofs=(), rcond=0.0)
 
 
-def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
+def by_deflation(model: SecondOrderModel, tol: float | None) -> Deflation:
+    """Propose deflations and prove them.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+    UncertainRankError
+        No decision about ranks leads to state equations with the spectrum of P(s).
+    """
+    found = deflated(model if tol is None else without_light_masses(model, tol), tol)
+    return found if found.model is model else replace(found, model=model)
+
+
+def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflation:
     """Reduce any regular model.
 
     Parameters
@@ -69,30 +149,36 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    system, units, pencil = scaled_pencil(model)
-    decisions: tuple[BlockDecision, ...] = ()
-    lossy: Deflated | None = None
-    exactly = tol is None and system.size <= LARGEST_EXACT
-    for rows, caution in _ways(system, exactly=exactly):
-        if lossy is not None and not isinstance(rows, ExactRows):
-            break
-        relaxation = relaxed(rows, caution, tol)
-        decisions = relaxation.decisions
+    best: Deflation | None = None
+    decisions: list[BlockDecision] = []
+    for found in _proposals(model, tol, decisions):
+        if found.evidence.loss.value <= ENOUGH or tol is not None:
+            return found
+        if best is None or found.evidence.loss.value < best.evidence.loss.value:
+            best = found
+    if best is None:
+        raise _uncertain_error(model, decisions, tol)
+    return best
+
+
+def _proposals(model: SecondOrderModel, tol: float | None, decisions: list[BlockDecision]) -> Iterator[Deflation]:
+    """Yield deflations that pass (19), or any where `tol` was given, with the decisions of the last one."""
+    rows, units, pencil = scaled_pencil(model)
+    system = RowSystem.scaled(rows)
+    found_before = False
+    for tried, caution in _ways(system, exactly=tol is None and system.size <= LARGEST_EXACT):
+        if found_before and not isinstance(tried, ExactRows):
+            return  # other cautions do not bring back digits
+        relaxation = relaxed(tried, caution, tol)
+        decisions[:] = relaxation.decisions
         if relaxation.offsets is None:
-            if lossy is None and pencil.is_singular():
+            if not found_before and pencil.is_singular():
                 raise _singular_error(model, pencil)
             continue
         result, certified = _realized(relaxation, relaxation.offsets, caution, pencil)
         if certified or tol is not None:
-            found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-            if lossy is not None:
-                return min(lossy, found, key=lambda item: item.loss)
-            if not exactly or isinstance(rows, ExactRows) or found.loss <= ENOUGH:
-                return replace(found, certified=certified)
-            lossy = found
-    if lossy is not None:
-        return lossy
-    raise _uncertain_error(model, decisions, tol)
+            yield _in_model_units(model, tol, relaxation, result, units, pencil, altered=not certified)
+            found_before = True
 
 
 def _realized(
@@ -120,32 +206,37 @@ def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caut
 
 def _in_model_units(
     model: SecondOrderModel,
+    tol: float | None,
     relaxation: Relaxed,
-    offsets: Offsets,
     result: Realization,
     units: Units,
     pencil: ScaledPencil,
-) -> Deflated:
+    *,
+    altered: bool,
+) -> Deflation:
     losses = pencil.losses(result.equations)
     known_to = np.maximum(losses.size, NOISE / ROUNDING * np.minimum(losses.error, TRUSTED * losses.size))
-    return Deflated(
-        selection=StateSelection(
+    counts = [] if relaxation.offsets is None else relaxation.offsets.equations.tolist()
+    return Deflation(
+        model=model,
+        coordinates=StateSelection(
             dofs=model.dofs,
             places=result.states,
-            differentiations={
-                model.dofs[i]: int(count) for i, count in enumerate(offsets.equations.tolist()) if count > 0
-            },
-            evidence=tuple([_evidence(model, decision) for decision in relaxation.decisions]),
+            differentiations={model.dofs[i]: int(count) for i, count in enumerate(counts) if count > 0},
         ),
         equations=in_model_units(result, units),
         rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
-        rcond=result.rcond,
-        loss=losses.worst,
-        certified=True,
+        evidence=Evidence(
+            decisions=tuple([_decision(model, decision) for decision in relaxation.decisions]),
+            rcond=result.rcond,
+            loss=Loss(losses.worst),
+            altered=altered,
+        ),
+        tol=tol,
     )
 
 
-def _evidence(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
+def _decision(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
     return RankDecision(
         matrix="J",
         dofs=_names(model, decision.unknowns),
@@ -170,9 +261,9 @@ def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPe
 
 
 def _uncertain_error(
-    model: SecondOrderModel, decisions: tuple[BlockDecision, ...], tol: float | None
+    model: SecondOrderModel, decisions: Sequence[BlockDecision], tol: float | None
 ) -> UncertainRankError:
-    closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
+    closest = min((_decision(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
     rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
@@ -185,38 +276,10 @@ def _uncertain_error(
     return UncertainRankError(msg, dofs=dofs, gap=gap)
 
 
-def by_deflation(model: SecondOrderModel, tol: float | None) -> ExactReduction:
-    """Reduce any regular model by deflation."""
-    result = deflated(model if tol is None else without_light_masses(model, tol), tol)
-    if result.certified:
-        warn_of_close_decisions(result.selection.evidence)
-        warn_of_lost_digits(result.loss, result.rcond)
-    else:
-        msg = (
-            f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
-            "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
-        )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    return ExactReduction(
-        model=model,
-        partition=result.selection,
-        leading=None,
-        equations=result.equations,
-        rcond=result.rcond,
-        known_rounding=result.rounding,
-        tol=tol,
-    )
-
-
-def index_of(reduction: ExactReduction) -> int:
-    """Find the index of the pencil (8) from the growth of its inverse.
-
-    With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass, the
-    transfer function grows as the inverse of (8) does.
-    """
-    model = reduction.model if reduction.tol is None else without_light_masses(reduction.model, reduction.tol)
+def _probe(model: SecondOrderModel) -> SecondOrderModel:
+    """Return the model whose transfer function grows as the inverse of the first-order pencil does."""
     unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
-    probe = replace(
+    return replace(
         model,
         B=_beside(unit, zero),
         Bv=_beside(zero, model.M),
@@ -228,9 +291,6 @@ def index_of(reduction: ExactReduction) -> int:
         Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
         Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
     )
-    result = deflated(probe, reduction.tol)
-    grown = output_signal(probe, result.equations, lambda: result.rounding)
-    return len(without_rounding(probe, grown, result.rounding).U)
 
 
 def _beside(left: Matrix, right: Matrix) -> Matrix:

@@ -13,6 +13,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors
 from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
+from halfdof_ctrl.reduction.method.units import ScaledRows
 
 DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
 
@@ -45,6 +46,17 @@ class RowSystem:
     row_logs: FloatArray  #: (n,) what rows still lack, as powers of two, to be the same in any units
     column_logs: FloatArray  #: (n,) the same for unknowns
     time_log: float  #: the same for each power of s
+
+    @classmethod
+    def scaled(cls, rows: ScaledRows) -> "RowSystem":
+        """Take entries as known to half a unit in the last place."""
+        return cls(
+            coefficients=rows.coefficients,
+            variance=(EPS * rows.coefficients) ** 2,
+            row_logs=rows.row_logs,
+            column_logs=rows.column_logs,
+            time_log=rows.time_log,
+        )
 
     @property
     def size(self) -> int:

@@ -1,13 +1,11 @@
 """The coordinates of a deflated model: displacements, velocities and, rarely, higher derivatives of DOFs."""
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.names import derivative_name
-from halfdof_ctrl.reduction.method.evidence import RankDecision
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -17,12 +15,6 @@ class StateSelection:
     dofs: tuple[str, ...]  #: names of the n DOFs
     places: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
     differentiations: dict[str, int]  #: how often the equation of a DOF was differentiated, if at all
-    evidence: tuple[RankDecision, ...]  #: blocks of J, equation (16)
-
-    @property
-    def method(self) -> Literal["deflation"]:
-        """The road."""
-        return "deflation"
 
     @property
     def states(self) -> tuple[str, ...]:

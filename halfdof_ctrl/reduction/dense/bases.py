@@ -8,19 +8,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray, read_only, unit_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import (
-    RANK_TOLERANCE,
-    UNCLEAR,
     cancelled,
     connected_columns,
     lengths_of_columns,
     mixture_names,
+    split_block,
 )
-from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors, logarithmic_scaling
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.evidence import RankDecision
 
@@ -29,9 +26,10 @@ from halfdof_ctrl.reduction.method.evidence import RankDecision
 class _Span:
     columns: FloatArray  #: (n, d) basis
     sizes: FloatArray  #: (n, d) what the rounding errors of its entries are relative to
+    places: IndexArray  #: (d,) DOFs in whose places the columns stand
 
     def part(self, which: IndexArray) -> "_Span":
-        return _Span(self.columns[:, which], self.sizes[:, which])
+        return _Span(self.columns[:, which], self.sizes[:, which], self.places[which])
 
 
 def orthonormal_bases(
@@ -57,14 +55,12 @@ def orthonormal_bases(
         model's units are; elsewhere they select DOFs.
     """
     unit = unit_matrix(len(model.dofs))
-    row_logs, column_logs, time = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
-    rows, columns = np.exp2(row_logs)[:, None], np.exp2(column_logs)
-    mass, damping = [rows * np.exp2(k * time) * matrix * columns for k, matrix in ((2.0, model.M), (1.0, model.C))]
-    massive, massless, first = _null_split("M", mass, _Span(unit, unit), model.dofs, tol, widest)
-    drag = cancelled(damping, massless.columns, massless.sizes)
+    every = _Span(unit, unit, np.arange(len(unit)))
+    massive, massless, first = _null_split("M", model.M, every, model.dofs, tol, widest)
+    drag = cancelled(model.C, massless.columns, massless.sizes)
     half, static, second = _null_split("C", drag, massless, model.dofs, tol, widest)
-    basis = np.hstack([massive.columns, half.columns, static.columns]) * columns[:, None]
-    sizes = np.hstack([massive.sizes, half.sizes, static.sizes]) * columns[:, None]
+    basis = np.hstack([massive.columns, half.columns, static.columns])
+    sizes = np.hstack([massive.sizes, half.sizes, static.sizes])
     lengths = lengths_of_columns(basis)
     basis, sizes = basis / lengths, sizes / np.abs(lengths)
     return DofPartition(
@@ -86,9 +82,7 @@ def _null_split(
 ) -> tuple[_Span, _Span, list[RankDecision]]:
     """Split a span of d vectors into a part where `product` (n, d) has full rank and its null space.
 
-    A mixed column of the null space is known to rounding of the largest entry that its DOF has in the block, times
-    the spread of the singular values that count; one of the other part may be any, so rounding alone counts. A column
-    that is taken over is as exact as it was.
+    A column that is taken over is as exact as it was; of mixed ones see `blocks.BlockSplit`.
     """
     nothing = span.part(np.zeros(0, dtype=np.intp))
     ranging, null, evidence = [nothing], [nothing], []
@@ -98,35 +92,24 @@ def _null_split(
         if part.shape[0] == 0:
             null.append(own)
             continue
-        row_factors, factors = levelling_factors(part)
-        _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
-        bound = tol
-        if bound is None:
-            bound = max(part.shape) * RANK_TOLERANCE
-            bound = gap_threshold(values / values[0], bound, bound * UNCLEAR)
-        rank = int(np.count_nonzero(values > bound * values[0]))
+        split = split_block(part, tol)
         concerned = tuple([dofs[index] for index in np.flatnonzero(own.columns.any(axis=1)).tolist()])
-        evidence.append(
-            RankDecision(
-                matrix=letter, dofs=concerned, singular_values=values, rank=rank, bound=float(bound * values[0])
-            )
-        )
-        spread = float(values[0] / values[rank - 1]) if rank else 1.0
-        if rank == block.size and spread <= widest:
+        evidence.append(RankDecision.of(letter, concerned, split))
+        if split.rank == block.size and split.spread <= widest:
             ranging.append(own)
             continue
-        speck = 4 * max(part.shape) * np.finfo(float).eps * spread
-        clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-        mixed = own.columns @ (factors[:, None] * clean)
-        size = (own.sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True)
-        whole = _Span(mixed, size * np.where(np.arange(block.size) < rank, 1.0, spread))
-        ranging.append(whole.part(np.arange(rank)))
-        null.append(whole.part(np.arange(rank, block.size)))
+        whole = _Span(*split.mixed(own.columns, own.sizes), own.places)
+        ranging.append(whole.part(np.arange(split.rank)))
+        null.append(whole.part(np.arange(split.rank, block.size)))
     return _joined(ranging), _joined(null), evidence
 
 
 def _joined(spans: list[_Span]) -> _Span:
-    return _Span(np.hstack([span.columns for span in spans]), np.hstack([span.sizes for span in spans]))
+    """Put spans beside each other, their columns in the order of the DOFs in whose places they stand."""
+    places = np.concatenate([span.places for span in spans])
+    order = np.argsort(places, kind="stable")
+    columns, sizes = np.hstack([span.columns for span in spans]), np.hstack([span.sizes for span in spans])
+    return _Span(columns[:, order], sizes[:, order], places[order])
 
 
 def _coordinate_names(basis: FloatArray, dofs: tuple[str, ...]) -> tuple[str, ...]:

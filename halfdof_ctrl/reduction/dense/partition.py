@@ -14,7 +14,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray, Matrix, unit_matrix
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.reduction.algebra.blocks import cancelled
-from halfdof_ctrl.reduction.method.evidence import RankDecision
+from halfdof_ctrl.reduction.method.evidence import LightMasses, RankDecision
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -31,6 +31,7 @@ class DofPartition:
     n_static: int
     coordinates: tuple[str, ...]  #: names of p: DOFs, or mix0, mix1, ... for combinations
     evidence: tuple[RankDecision, ...]  #: what the orthonormal bases rest on
+    light: LightMasses | None = None  #: inertial DOFs whose mass hardly counts
 
     @property
     def inertial(self) -> tuple[str, ...]:

@@ -3,16 +3,16 @@
 Null columns of M are half or static, of these the null columns of C static (Simionatto and others, section 2).
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import read_only
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.dense.partition import DofPartition
-from halfdof_ctrl.reduction.method.evidence import warn_of_tiny_masses
+from halfdof_ctrl.reduction.method.evidence import LightMasses
 from halfdof_ctrl.reduction.method.masses import mass_ratios, spread_is_wide
 
 
@@ -25,17 +25,22 @@ def select_columns(model: SecondOrderModel, tol: float | None = None) -> DofPart
         A real model.
     tol : float, optional
         A column of M counts as null where its scaled size is at most `tol` times the largest one. By
-        default only exact zeros count. The scale is unit-free: see `mass_ratios`.
+        default only exact zeros count. The scale is unit-free: see `masses.mass_ratios`.
 
-    Warns
-    -----
-    NearlyMasslessWarning
-        A mass is not zero but below 1e-10 of the others in scaled units.
+    Returns
+    -------
+    DofPartition
+        With the masses that are not zero but hardly count as `light`.
     """
     inertial, half = null_column_kinds(model.M, model.C)
+    light = None
     if tol is not None or spread_is_wide(model, inertial):
-        inertial, half = _without_tiny_masses(model, inertial, 0.0 if tol is None else tol)
-    return _selection(tuple(inertial.tolist()), tuple(half.tolist()), model.dofs)
+        ratio = mass_ratios(model)
+        inertial = inertial & (ratio > (0.0 if tol is None else tol))
+        half = model.C.any(axis=0) & ~inertial
+        light = LightMasses.among(ratio, inertial, model.dofs)
+    partition = _selection(tuple(inertial.tolist()), tuple(half.tolist()), model.dofs)
+    return partition if light is None else replace(partition, light=light)
 
 
 @lru_cache(maxsize=32)
@@ -55,13 +60,3 @@ def _selection(massive: tuple[bool, ...], damped: tuple[bool, ...], dofs: tuple[
         coordinates=tuple([dofs[i] for i in order]),
         evidence=(),
     )
-
-
-def _without_tiny_masses(
-    model: SecondOrderModel, inertial: npt.NDArray[np.bool_], tol: float
-) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Take masses up to `tol` as none, and warn of those that are tiny and stay."""
-    ratio = mass_ratios(model)
-    inertial = inertial & (ratio > tol)
-    warn_of_tiny_masses(ratio, inertial, model.dofs)
-    return inertial, model.C.any(axis=0) & ~inertial

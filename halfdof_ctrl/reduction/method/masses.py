@@ -47,7 +47,7 @@ def own_speeds(model: SecondOrderModel) -> FloatArray:
 
 
 def slowest_speed(model: SecondOrderModel) -> float:
-    """Return the own frequency of the slowest DOF, or a mean frequency of the entries where no DOF has one by itself."""
+    """Return the own frequency of the slowest DOF, or a mean one of the entries where no DOF has one by itself."""
     speeds = own_speeds(model)
     if (speeds > 0.0).any():
         return float(np.sqrt(speeds[speeds > 0.0].min()))

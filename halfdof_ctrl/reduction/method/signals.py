@@ -6,7 +6,7 @@ w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                     
 Derivatives of the inputs in the equation of the state are absorbed by another choice of it, equation (5).
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -49,6 +49,24 @@ class StateEquations:
     B: FloatArray  #: (N, m)
     displacement: Signal  #: all n displacements, equation (4)
     shift: tuple[FloatArray, ...]  #: E_0, E_1, ... of equation (5), (N, m) each
+
+    def motion(self, derivative: int) -> Signal:
+        """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
+        signal = self.displacement
+        for _ in range(derivative):
+            signal = signal.derivative(self.A, self.B)
+        return signal
+
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return q or q' of all DOFs, (n, k), for states (N, k) and for the inputs and their derivatives, (m, k) each.
+
+        Derivatives that are missing at the end count as zero.
+        """
+        motion = self.motion(derivative)
+        history = np.tensordot(motion.X, x, axes=1)
+        for part, values in zip(motion.U, inputs, strict=False):
+            history += np.tensordot(part, values, axes=1)
+        return np.asarray(history)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray, powers_of_two
+from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
 from halfdof_ctrl.reduction.algebra.scaling import logarithmic_scaling
-from halfdof_ctrl.reduction.deflation.row_system import RowSystem
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -28,7 +27,17 @@ class Units:
         return np.asarray(np.ldexp(values, np.asarray(power, dtype=np.intc) * exponent))
 
 
-def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ScaledRows:
+    """``P(s) q = B(s) u`` in scaled units: n equations and unknowns, m inputs."""
+
+    coefficients: FloatArray  #: (k, n, n + m) of [P B]
+    row_logs: FloatArray  #: (n,) what rows still lack, as powers of two, to be the same in any units
+    column_logs: FloatArray  #: (n,) the same for unknowns
+    time_log: float  #: the same for each power of s
+
+
+def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[ScaledRows, Units]:
     """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
     row_logs, column_logs, time_log = logarithmic_scaling(P)
     row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
@@ -38,11 +47,10 @@ def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
     driven = B * first * rows * speed
     second = powers_of_two(np.abs(driven).max(axis=(0, 1), initial=0.0))
     scaled = np.concatenate([P * np.exp2(column_powers) * rows * speed, driven * second], axis=2)
-    system = RowSystem(
+    rows_in_units = ScaledRows(
         coefficients=scaled,
-        variance=(EPS * scaled) ** 2,
         row_logs=row_logs - row_powers,
         column_logs=column_logs - column_powers,
         time_log=float(time_log - time_power),
     )
-    return system, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))
+    return rows_in_units, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))

@@ -13,6 +13,7 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
 
+LOST = "K''"  #: the key of the imaginary part of a complex K among the matrices
 BLOCK = 32  #: motions that are multiplied at a time
 FAST = 1e-10  #: square of the band's upper end over a coordinate's own frequency up to which it needs no mass
 MASSLESS = 1e-13  #: of the scaled mass: combinations of coordinates below have none but rounding
@@ -51,16 +52,18 @@ def projected(
     M[modal, modal], K[modal, modal] = np.eye(count), np.diag(motions.omega**2)
     signals: dict[str, Any] = {letter: np.asarray(parts[letter].T @ motions.shapes).T for letter in ("B", "Bv", "Ba")}
     signals |= {letter: times(parts[letter], motions.shapes) for letter in ("F", "G", "H")}
+    lost = _between(motions.shapes, parts[LOST]) if LOST in parts else None
     M, turn = _massless_columns(M, K, omega, kept)
     if turn is not None:
         C, K = _cleaned(turn.T, C, turn), _cleaned(turn.T, K, turn)
+        lost = None if lost is None else _cleaned(turn.T, lost, turn)
         signals |= {letter: turn.T @ signals[letter] for letter in ("B", "Bv", "Ba")}
         signals |= {letter: signals[letter] @ turn for letter in ("F", "G", "H")}
     signals |= {letter: parts[letter].toarray() for letter in ("D", "Dv", "Da")}
     small = mechss(
         M,
         C,
-        K,
+        K if lost is None else K + 0.5j * (lost + lost.T),
         **signals,
         dofs=_names(model.dofs, motions, turn),
         name=model.name,

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import (
@@ -35,7 +36,7 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
-from halfdof_ctrl.reduction.modal.projection import projected
+from halfdof_ctrl.reduction.modal.projection import LOST, projected
 from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resonance_errors
 
 POINTS = 12  #: frequencies between resonances at which the error is measured
@@ -99,8 +100,9 @@ def truncate_modes(
     Parameters
     ----------
     model : SecondOrderModel
-        Real, sparse or dense, with symmetric M and K that are positive semidefinite. Choose its inputs and outputs
-        before, with `select`: their DOFs are kept.
+        Sparse or dense, with symmetric M and K that are positive semidefinite. K may be complex (structural
+        damping): the modes are those of its real part, and the small model's K is complex too. Choose its inputs and
+        outputs before, with `select`: their DOFs are kept.
     f_max : float, optional
         Highest frequency that matters [Hz]. The modes up to twice this frequency are kept, found with the kept DOFs
         held.
@@ -120,7 +122,7 @@ def truncate_modes(
     ParameterError
         Not exactly one of `f_max` and `n_modes`, one that is not positive, or no convergence of the Lanczos iteration.
     ComplexModelError
-        The model has structural damping.
+        Another matrix than K has imaginary parts.
     MatrixError
         M or K is not symmetric.
     ModelSizeError
@@ -157,6 +159,8 @@ def truncate_modes(
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     parts = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    if model.is_complex:  # modes are those of the real part; both are projected on them
+        parts |= {"K": csc_array(parts["K"].real), LOST: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
@@ -181,12 +185,13 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
 
 
 def _require_symmetric(model: SecondOrderModel) -> None:
-    if model.is_complex:
+    others = tuple([letter for letter in model.complex_matrices if letter != "K"])
+    if others:
         msg = (
-            f"{listed(model.complex_matrices)} has imaginary parts (structural damping): its modes are not those of M "
-            "and K, and no real small model has them. descriptor_response computes such a model as it is."
+            f"{listed(others)} has imaginary parts, and a truncation keeps those of K alone (structural damping). "
+            "descriptor_response computes such a model as it is."
         )
-        raise ComplexModelError(msg, matrices=model.complex_matrices)
+        raise ComplexModelError(msg, matrices=others)
     for letter in "MK":
         asymmetry = is_unsymmetric(as_sparse(getattr(model, letter)))
         if asymmetry:

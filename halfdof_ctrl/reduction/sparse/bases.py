@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-import scipy.linalg
 from scipy.sparse import coo_array, csc_array
 
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray, read_only
@@ -12,8 +11,7 @@ from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, sparse_unit
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.blocks import RANK_TOLERANCE, lengths_of_columns
-from halfdof_ctrl.reduction.algebra.scaling import unit_free_factors
+from halfdof_ctrl.reduction.algebra.blocks import lengths_of_columns, split_block
 from halfdof_ctrl.reduction.method.evidence import RankDecision
 from halfdof_ctrl.reduction.sparse.partition import (
     HALF,
@@ -56,10 +54,10 @@ class _Mixture:
     sizes: FloatArray
 
 
-def sparse_bases(model: SecondOrderModel, tol: float | None = None) -> SparsePartition:
+def sparse_bases(model: SecondOrderModel, tol: float | None = None, *, widest: float = float("inf")) -> SparsePartition:
     """Split the motion of a sparse model into null(M) with null(C), the rest of null(M), and what is left.
 
-    As `partition.orthonormal_bases` does.
+    As `dense.bases.orthonormal_bases` does, and with the same columns.
 
     Raises
     ------
@@ -68,9 +66,9 @@ def sparse_bases(model: SecondOrderModel, tol: float | None = None) -> SparsePar
     """
     unit = as_sparse(sparse_unit(len(model.dofs)))
     every = np.ones(len(model.dofs), dtype=bool)
-    span, massless, first = _null_split("M", as_sparse(model.M), _Span(unit, unit), every, model.dofs, tol)
+    span, massless, first = _null_split("M", as_sparse(model.M), _Span(unit, unit), every, model.dofs, tol, widest)
     drag = cancelled(as_sparse(model.C), span.columns, span.sizes)
-    span, static, second = _null_split("C", drag, span, massless, model.dofs, tol)
+    span, static, second = _null_split("C", drag, span, massless, model.dofs, tol, widest)
     kinds = np.where(static, STATIC, np.where(massless, HALF, INERTIAL)).astype(np.int8)
     return SparsePartition(
         method="orthogonal",
@@ -89,10 +87,11 @@ def _null_split(
     which: Mask,
     dofs: tuple[str, ...],
     tol: float | None,
+    widest: float,
 ) -> tuple[_Span, Mask, list[RankDecision]]:
     """Split the columns of a span that `which` picks into a part where `product` has full rank and its null space.
 
-    The null space is the second mask. See `partition._null_split` for what is known to which rounding.
+    The null space is the second mask.
     """
     filled = which & (np.diff(product.indptr) > 0)
     null = which & ~filled
@@ -101,29 +100,16 @@ def _null_split(
     for block in linked_columns(product, np.flatnonzero(filled)):
         if block.size > LARGEST_BLOCK:
             raise _block_error(letter, block, dofs)
-        own_rows, own, own_sizes = _dense_block(span, block)
+        rows, own, sizes = _dense_block(span, block)
         linked = product[:, block]
-        part = np.asarray(linked[np.unique(linked.indices)].toarray())
-        row_factors, factors = unit_free_factors(part)
-        _, values, right = scipy.linalg.svd(part * row_factors[:, None] * factors)
-        bound = max(part.shape) * RANK_TOLERANCE if tol is None else tol
-        rank = int(np.count_nonzero(values > bound * values[0]))
-        concerned = tuple([dofs[index] for index in own_rows.tolist()])
-        evidence.append(
-            RankDecision(
-                matrix=letter, dofs=concerned, singular_values=values, rank=rank, bound=float(bound * values[0])
-            )
-        )
-        if rank == block.size:
+        split = split_block(np.asarray(linked[np.unique(linked.indices)].toarray()), tol)
+        evidence.append(RankDecision.of(letter, tuple([dofs[index] for index in rows.tolist()]), split))
+        if split.rank == block.size and split.spread <= widest:
             continue
-        spread = values[0] / values[rank - 1]
-        speck = 4 * max(part.shape) * np.finfo(float).eps * spread
-        clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)
-        size = (own_sizes @ (factors[:, None] * np.ones_like(clean))).max(axis=1, keepdims=True) * spread
-        mixed = own @ (factors[:, None] * clean)
+        mixed, size = split.mixed(own, sizes)
         lengths = lengths_of_columns(mixed)
-        mixtures.append(_Mixture(own_rows, block, mixed / lengths, size / np.abs(lengths)))
-        null[block[rank:]] = True
+        mixtures.append(_Mixture(rows, block, mixed / lengths, size / np.abs(lengths)))
+        null[block[split.rank :]] = True
     return span.replaced(mixtures), null, evidence
 
 

@@ -6,7 +6,7 @@ its row of (4); where the states and inputs are fewer than the combinations, the
 Histories of all DOFs take one solution a time.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -21,7 +21,6 @@ from halfdof_ctrl.base.sparse_products import Transposed, times
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU, largest_of_columns
-from halfdof_ctrl.reduction.method.recovery import forward_slope
 from halfdof_ctrl.reduction.method.signals import Signal, absorbed, trimmed
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
 
@@ -190,19 +189,9 @@ class SparseDisplacement:
         ]
         return Signal(total.X, trimmed((*total.U[:1], *kept)))
 
-    def histories(self, x: FloatArray, u: FloatArray, time: FloatArray) -> list[FloatArray]:
-        """Return displacements and velocities of all DOFs, (n, k) each, for states (N, k) and inputs (m, k) at k times.
-
-        Where a derivative of an input is needed, its slope until the next time is taken.
-        """
-        slopes = [u]
-        while len(slopes) < len(self.equation.forces) + 1:
-            slopes.append(forward_slope(slopes[-1], time))
-        return [self.motion_at(x, slopes, derivative) for derivative in range(2)]
-
     @limited_threads(1)
-    def motion_at(self, x: FloatArray, inputs: list[FloatArray], derivative: int) -> FloatArray:
-        """Return q or q' (derivative 0 or 1) of all DOFs, (n, k), for states and for the inputs and their derivatives."""
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return q or q' (derivative 0 or 1) of all DOFs, (n, k), for states, inputs and derivatives of inputs."""
         part, forces = self.equation.partition, self.equation.forces
         for _ in range(derivative):
             x, inputs = self.A @ x + self.B @ inputs[0], inputs[1:]

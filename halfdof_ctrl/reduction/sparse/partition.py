@@ -25,7 +25,7 @@ from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, sparse_unit
 from halfdof_ctrl.reduction.algebra.blocks import CANCELLATION, mixture_names
-from halfdof_ctrl.reduction.method.evidence import RankDecision
+from halfdof_ctrl.reduction.method.evidence import LightMasses, RankDecision
 
 Mask = npt.NDArray[np.bool_]
 INERTIAL, HALF, STATIC = 0, 1, 2  #: kinds of columns
@@ -42,6 +42,7 @@ class SparsePartition:
     columns: SparseMatrix | None  #: (n, n) T with its columns in the order of the DOFs; None for the identity
     sizes: SparseMatrix | None  #: (n, n) what the rounding errors of these entries are relative to; None if exact
     evidence: tuple[RankDecision, ...]  #: what the orthonormal bases rest on
+    light: LightMasses | None = None  #: inertial DOFs whose mass hardly counts
 
     @cached_property
     def order(self) -> IndexArray:
@@ -124,18 +125,30 @@ class SparsePartition:
         p = self.to_coordinates(displacements[:, None])[: self.n_inertial + self.n_half, 0]
         return np.concatenate([p, self.to_coordinates(velocities[:, None])[: self.n_inertial, 0]])
 
+    def state_maps(self) -> tuple[FloatArray, FloatArray]:
+        """Return L_q and L_v, (N, n) each, of x = L_q q + L_v q'; dense, of small models."""
+        moving, n_i = self.n_inertial + self.n_half, self.n_inertial
+        self._require_small("L_q and L_v")
+        to_coordinates = self.to_coordinates(np.eye(len(self.dofs)))
+        from_q, from_v = np.zeros((2, moving + n_i, len(self.dofs)))
+        from_q[:moving], from_v[moving:] = to_coordinates[:moving], to_coordinates[:n_i]
+        return from_q, from_v
+
     @property
     def T(self) -> FloatArray:  # noqa: N802
         """(n, n) transformation q = T p, its columns in the order inertial, half, static; dense, of small models."""
+        self._require_small("T")
+        columns = as_sparse(sparse_unit(len(self.dofs))) if self.columns is None else self.columns
+        return np.asarray(columns.toarray()[:, self.order])
+
+    def _require_small(self, what: str) -> None:
         n = len(self.dofs)
         if n > LARGEST_BASIS:
             msg = (
-                f"T of {n} DOFs would take {8e-9 * n**2:.3g} GB as a dense matrix. `columns` has it sparse, and "
+                f"{what} of {n} DOFs would take {8e-9 * n**2:.3g} GB as a dense matrix. `columns` has T sparse, and "
                 "`order` the order of its columns."
             )
             raise ModelSizeError(msg, size=n, limit=LARGEST_BASIS)
-        columns = as_sparse(sparse_unit(n)) if self.columns is None else self.columns
-        return np.asarray(columns.toarray()[:, self.order])
 
     def of_kind(self, kind: int) -> IndexArray:
         """Return the positions of the coordinates of one kind."""

@@ -1,14 +1,12 @@
 """Claims about DMIG and EXTRN entries: three kinds of fields read alike, pyyeti agrees, and damage is told."""
 
-from collections.abc import Iterable
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.dmig import has_dmig, has_extrn, read_dmig, read_extrn
-from support.fe_files import EXPORTS, NAMES, C, K, M, dmig
+from support import exported_files as exported
+from support.fe_files import NAMES, C, K, M, dmig
 
 SMALL = """\
 DMIG    KAAX           0       6       1       0
@@ -103,28 +101,17 @@ def test_a_damaged_extrn_is_refused(text: str, message: str) -> None:
         read_extrn(text.encode())
 
 
-def names_of(index: Iterable[tuple[int, int]]) -> tuple[str, ...]:
-    """Name pairs of node and component, by another rule than the reader's."""
-    return tuple(f"n{node}_{'ur'[dof > 3]}{(dof - 1) % 3 + 1}" if dof else f"n{node}" for node, dof in index)
-
-
-@pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
-def test_a_punch_file_of_nastran_reads_as_pyyeti_reads_it() -> None:
-    """Square and symmetric matrices of 21 DOFs, and their labels."""
-    bulk = pytest.importorskip("pyyeti.nastran.bulk")
-    path = EXPORTS / "nastran" / "matrix_factory.pch"
-    expected = bulk.rddmig(str(path), square=True)
-    found = {raw.title: raw for raw in read_dmig(path.read_bytes())}
+def test_a_punch_file_of_pyyeti_reads_as_it_was_written() -> None:
+    """Square and symmetric matrices of 15 DOFs, and their labels; a rectangular one is passed over."""
+    found = {raw.title: raw for raw in read_dmig((exported.DATA / "forms.pch").read_bytes())}
     assert set(found) == {"patrn", "ident", "randm"}
     for title, raw in found.items():
-        np.testing.assert_array_equal(raw.matrix.toarray(), expected[title].to_numpy())
-        assert raw.dofs == names_of(expected[title].index)
+        np.testing.assert_array_equal(raw.matrix.toarray(), exported.FORMS[title])
+        assert raw.dofs == tuple(
+            f"n{node}_{'ur'[dof > 3]}{(dof - 1) % 3 + 1}" if dof else f"n{node}" for node, dof in exported.FORM_PLACES
+        )
 
 
-@pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
-def test_the_rows_of_a_superelement_are_those_of_pyyeti() -> None:
+def test_the_rows_of_a_superelement_are_those_that_pyyeti_wrote() -> None:
     """Four grid points and eight scalar points."""
-    bulk = pytest.importorskip("pyyeti.nastran.bulk")
-    path = Path(EXPORTS / "nastran" / "inboard.pch")
-    uset = bulk.asm2uset(str(path))[0]
-    assert read_extrn(path.read_bytes()) == names_of(uset.index)
+    assert read_extrn((exported.DATA / "superelement.pch").read_bytes()) == exported.SUPERELEMENT_DOFS

@@ -10,7 +10,8 @@ import pytest
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.output4 import is_binary_output4, is_text_output4, read_output4
-from support.fe_files import EXPORTS, K, M, output4_binary, output4_text
+from support import exported_files as exported
+from support.fe_files import K, M, output4_binary, output4_text
 
 LAYOUTS = pytest.mark.parametrize("layout", ["dense", "sparse", "big"])
 HOLES = np.array([[0.0, 1.0, 0.0], [5.0, 0.0, 2.0], [0.0, -3.0, 0.0], [1e-9, 0.0, 0.0]])
@@ -67,39 +68,34 @@ def test_form_one_with_one_triangle_is_told() -> None:
 
 
 @pytest.mark.parametrize("sparse", ["dense", "bigmat", "nonbigmat"])
-@pytest.mark.parametrize("binary", [False, True])
-def test_what_pyyeti_writes_is_read(tmp_path: Path, sparse: str, *, binary: bool) -> None:
-    """A second opinion on every layout, where it is installed."""
-    op4 = pytest.importorskip("pyyeti.nastran.op4")
-    rng = np.random.default_rng(4)
-    matrices = {"kaa": rng.normal(size=(40, 40)) * (rng.random((40, 40)) < 0.3), "cplx": K * (2 - 1j), "rect": HOLES}
-    op4.write(tmp_path / "a.op4", matrices, binary=binary, sparse=sparse, digits=16)
-    found = {raw.title: raw.matrix.toarray() for raw in read_output4((tmp_path / "a.op4").read_bytes())}
-    for name, matrix in matrices.items():
-        np.testing.assert_allclose(found[name], matrix, rtol=1e-15)
+@pytest.mark.parametrize("kind", ["text", "binary"])
+def test_what_pyyeti_writes_is_read(kind: str, sparse: str) -> None:
+    """A second opinion on every layout: real, complex and rectangular matrices to the last digit."""
+    content = (exported.DATA / f"pyyeti_{kind}_{sparse}.op4").read_bytes()
+    found = {raw.title: raw.matrix.toarray() for raw in read_output4(content)}
+    assert set(found) == set(exported.LAYOUTS)
+    for name, matrix in exported.LAYOUTS.items():
+        np.testing.assert_array_equal(found[name], matrix)
 
 
-@pytest.mark.parametrize("name", ["inboard.op4", "ascii_fabiola.op4", "binary_fabiola.op4"])
-def test_files_of_nastran_read_as_pyyeti_reads_them(name: str) -> None:
-    """Every matrix in them, where the files and pyyeti are there."""
-    op4 = pytest.importorskip("pyyeti.nastran.op4")
-    path = EXPORTS / "nastran" / name
-    if not path.exists():
-        pytest.skip("no exported files here")
-    expected = op4.read(str(path))
-    found = {raw.title: raw.matrix.toarray() for raw in read_output4(path.read_bytes())}
+@pytest.mark.parametrize("name", ["superelement.op4", "single_text.op4", "single_binary.op4"])
+def test_files_in_the_layouts_of_nastran_read_as_they_were_written(tmp_path: Path, name: str) -> None:
+    """Every matrix in them, of a superelement in double and of three forms in single precision."""
+    expected = exported.superelement() if name == "superelement.op4" else exported.TWO_WAYS
+    found = {raw.title: raw.matrix.toarray() for raw in read_output4(exported.content(name, tmp_path))}
     assert set(found) == set(expected)
     for title, matrix in expected.items():
         np.testing.assert_array_equal(found[title], matrix)
 
 
-@pytest.mark.skipif(not EXPORTS.exists(), reason="no exported files here")
 def test_text_and_binary_of_one_model_agree() -> None:
-    """Nastran wrote the same three matrices both ways, the text with 16 digits."""
-    both = [read_output4((EXPORTS / "nastran" / f"{kind}_fabiola.op4").read_bytes()) for kind in ("ascii", "binary")]
+    """The same three matrices both ways in single precision, which a text shows with more digits than it has."""
+    thirds = {name: matrix / 3.0 for name, matrix in exported.TWO_WAYS.items()}
+    rounded = {name: matrix.astype(np.float32).astype(np.float64) for name, matrix in thirds.items()}
+    both = read_output4(exported.single_text(rounded)), read_output4(exported.single_binary(thirds))
     for text, binary in zip(*both, strict=True):
         assert text.title == binary.title
-        np.testing.assert_allclose(text.matrix.toarray(), binary.matrix.toarray(), rtol=1e-15)
+        np.testing.assert_array_equal(text.matrix.toarray(), binary.matrix.toarray())
 
 
 def patched(content: bytes, place: int, value: int) -> bytes:

@@ -22,7 +22,7 @@ def test_numbers_come_back_to_the_last_bit() -> None:
 
 def test_rows_in_several_blocks_are_joined_in_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """A table does not depend on where it is cut."""
-    monkeypatch.setattr("halfdof_ctrl.files.formats.text_blocks.BLOCK", 7)
+    monkeypatch.setattr("halfdof_ctrl.files.formats.text_blocks.TEXT_BLOCK", 7)
     text = b"".join(b"%d %d\n" % (k, k * k) for k in range(50))
     np.testing.assert_array_equal(number_rows(text, 2, comment="%"), [[k, k * k] for k in range(50)])
 
@@ -56,7 +56,7 @@ def test_a_row_that_is_wrong_is_told_by_its_line(text: bytes, line: int, message
 
 def test_the_line_is_right_in_a_later_block(monkeypatch: pytest.MonkeyPatch) -> None:
     """Blocks count their lines."""
-    monkeypatch.setattr("halfdof_ctrl.files.formats.text_blocks.BLOCK", 4)
+    monkeypatch.setattr("halfdof_ctrl.files.formats.text_blocks.TEXT_BLOCK", 4)
     with pytest.raises(FileFormatError, match="no finite number") as caught:
         number_rows(b"1 2\n" * 20 + b"1 x\n", 2, comment="*")
     assert caught.value.line == 21

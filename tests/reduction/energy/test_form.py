@@ -13,7 +13,15 @@ from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss,
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.errors import EnergyFormError
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form, energy_system
-from support.beams import FIRST_MODES, ball_transfer, beam_matrices, cantilever, stiff_chain, zener_cantilever
+from support.beams import (
+    FIRST_MODES,
+    ball_transfer,
+    beam_matrices,
+    cantilever,
+    plane_frame,
+    stiff_chain,
+    zener_cantilever,
+)
 from support.exact import transfer
 
 CORRECTED = 2e-12  #: relative, by a plain solve at resonances (a square root of what DOF states lose, at 40 elements)
@@ -150,6 +158,17 @@ def test_free_beam_moves_as_a_rigid_body_far_below_its_first_mode(elements: int)
     omega = 22.37 * 3e-4
     assert_allclose(plain(form, 1j * omega)[0, 0] * omega**2, 2.0, rtol=1e-6)
     assert np.count_nonzero(np.linalg.eigvals(form.A) == 0.0) == 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_free_frame_has_three_rigid_motions_and_a_clamped_one_none(seed: int) -> None:
+    """Bars at any angle, K unsymmetric by rounding of T^T K T: six poles at exactly 0, and none with a node held."""
+    steps = np.random.default_rng(seed).standard_normal((12, 2))
+    M, K = plane_frame(np.cumsum(steps, axis=0))
+    free, held = energy_form(mechss(M, None, K)), energy_form(mechss(M[3:, 3:], None, K[3:, 3:]))
+    assert free.n_rigid == free.n_massive == 3
+    assert np.count_nonzero(np.linalg.eigvals(free.A) == 0.0) == 6
+    assert held.n_rigid == 0
 
 
 def test_dampers_inside_a_free_body_do_not_resist_it() -> None:

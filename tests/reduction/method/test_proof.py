@@ -23,12 +23,12 @@ MEASURED = 0.5  # a loss is a figure of one digit
 
 def pencil_of(model: SecondOrderModel) -> ScaledPencil:
     """Scale a model's quadratics; outputs are all scaled displacements."""
-    system, _ = scaled_rows(
+    rows, _ = scaled_rows(
         np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
     )
-    n, m = system.size, model.B.shape[1]
+    n, m = len(model.dofs), model.B.shape[1]
     F = np.concatenate([np.eye(n)[None], np.zeros((2, n, n))])
-    return ScaledPencil(P=system.matrix, B=system.coefficients[:, :, n:], F=F, D=np.zeros((3, n, m)))
+    return ScaledPencil(P=rows.coefficients[:, :, :n], B=rows.coefficients[:, :, n:], F=F, D=np.zeros((3, n, m)))
 
 
 def equations_of(model: SecondOrderModel) -> StateEquations:

@@ -279,10 +279,10 @@ def test_impossible_requests_are_refused(options: dict[str, Any], words: str) ->
 
 
 def test_models_without_real_modes_are_refused() -> None:
-    """Structural damping, and an unsymmetric stiffness."""
+    """A complex damping, and an unsymmetric stiffness."""
     K = np.array([[2.0, -1.0], [-1.0, 2.0]])
-    with pytest.raises(ComplexModelError, match="K has imaginary parts"):
-        truncate_modes(mechss(csc_array(np.eye(2)), None, K * (1 + 0.1j)), n_modes=1)
+    with pytest.raises(ComplexModelError, match="C has imaginary parts"):
+        truncate_modes(mechss(csc_array(np.eye(2)), 0.1j * K, K), n_modes=1)
     with pytest.raises(MatrixError, match="K is not symmetric") as caught:
         truncate_modes(mechss(csc_array(np.eye(2)), None, np.triu(K)), n_modes=1)
     assert caught.value.matrix == "K"

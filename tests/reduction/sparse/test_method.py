@@ -18,6 +18,7 @@ from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
     InconsistentStateError,
+    LostDigitsWarning,
     ModelSizeError,
     SingularLeadingMatrixError,
     SingularPencilError,
@@ -33,6 +34,7 @@ EPS = float(np.finfo(float).eps)
 TRANSFER = 1e-10  # as for dense models: random structures, n <= 12, relative to the channel
 LOSS = 64  # times eps / rcond(W)
 POINTS: npt.NDArray[np.complex128] = np.array([0.3j, 1.1j, 4.7j, 0.6 + 0.2j])  # [rad/s]
+MAY_LOSE = pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.LostDigitsWarning")  # the tolerance has rcond
 AT_SIZE = 1e-8  # eigenvalues and responses of frames and grids against other solves
 
 
@@ -68,6 +70,7 @@ def test_order_is_the_degree_of_the_determinant(structure: Structure) -> None:
         assert reduction.order == exact.order(*structure.matrices)
 
 
+@MAY_LOSE
 @given(structure=structures(), method=st.sampled_from([None, "selection", "orthogonal"]))
 def test_every_method_gives_what_it_gives_dense(structure: Structure, method: Any) -> None:  # noqa: ANN401
     """The same refusals, and the exact transfer function."""
@@ -110,6 +113,7 @@ def signals(draw: st.DrawFn) -> tuple[Structure, dict[str, npt.NDArray[np.float6
     return structure, matrices
 
 
+@MAY_LOSE
 @given(drawn=signals())
 def test_all_signals_are_those_of_the_dense_model(drawn: tuple[Structure, dict[str, npt.NDArray[np.float64]]]) -> None:
     """Velocities, accelerations, derivatives of inputs: the same improper pairs, or the same transfer function."""
@@ -212,7 +216,8 @@ def test_a_slender_beam_keeps_the_digits_that_its_condition_takes() -> None:
     K = csc_array(csc_array(coo_array(entries, shape=(2 * n + 2, 2 * n + 2)))[2:, 2:])
     tip = 2 * n - 2
     M = csc_array(([1.0], ([tip], [tip])), shape=K.shape)
-    A = mech2ss(mechss(M, None, K).select(f"F_q{tip}", f"q{tip}")).A
+    with pytest.warns(LostDigitsWarning, match=r"lose .*e-0[78] of the transfer function"):  # beside the resonance
+        A = mech2ss(mechss(M, None, K).select(f"F_q{tip}", f"q{tip}")).A
     assert_allclose(-A[1, 0], 3.0 / n**3, rtol=1e-8)  # 1.6e-6 off without corrections in extended precision
 
 
@@ -225,7 +230,7 @@ def test_slanted_dampers_take_a_single_factorization(monkeypatch: pytest.MonkeyP
     used: list[str] = []
     monkeypatch.setattr(SparseLU, "factorized", _noting(used, "factorized", SparseLU.factorized))
     reduction = exact_reduction(model)
-    assert reduction.partition.method == "orthogonal"
+    assert reduction.method == "orthogonal"
     assert len(reduction.partition.half) == 1
     assert used == ["factorized"]
     desired = model.as_dense()(POINTS, squeeze=False)
