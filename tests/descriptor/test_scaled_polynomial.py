@@ -38,7 +38,7 @@ def test_logarithmic_derivative_is_that_of_the_determinant() -> None:
     """``(2 s + 5) / ((s + 2)(s + 3))``, in the unit of the polynomial."""
     scaled = polynomial()
     s = np.array([1.0 + 2.0j, -7.0 + 0.5j])
-    found = scaled.logarithmic_derivative(s / scaled.unit) / scaled.unit
+    found = scaled.logarithmic_derivative((s / scaled.unit).astype(np.complex128)) / scaled.unit
     assert_allclose(found, (2.0 * s + 5.0) / ((s + 2.0) * (s + 3.0)), rtol=ROUNDOFF)
 
 

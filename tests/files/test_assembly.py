@@ -22,7 +22,7 @@ def laid(folder: Path, **files: str | bytes) -> Path:
     return folder
 
 
-def dense(part: Any) -> npt.NDArray[Any]:
+def dense(part: Any) -> npt.NDArray[Any]:  # noqa: ANN401  # dense or sparse
     """Expand a matrix that must be there."""
     assert part is not None
     return np.asarray(part.toarray())

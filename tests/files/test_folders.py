@@ -66,7 +66,7 @@ def test_numbers_that_matlab_saves_as_text_are_a_table(tmp_path: Path) -> None:
     """By save -ascii K.mat."""
     np.savetxt(tmp_path / "K.mat", K)
     model = load_model(tmp_path / "K.mat", matrices={"M": None, "C": None})
-    assert model.K.toarray().tolist() == K.tolist()  # type: ignore[union-attr]
+    assert model.K.toarray().tolist() == K.tolist()
 
 
 @pytest.mark.parametrize(
