@@ -16,10 +16,11 @@ SOFT, STIFF = 3e5 + 4e4j, 3.1e5 + 6e4j
 MODULI = abs(SOFT), abs(STIFF)
 ANGLES = np.degrees(np.angle(SOFT)), np.degrees(np.angle(STIFF))
 SPEEDS = 2 * np.pi, 20 * np.pi
+ETA = 40 / 3, 60 / 3.1
 TABLES = {
     "storage and loss": "f [Hz],K' [N/mm],K'' [N/mm]\n1,300,40\n10,310,60\n",
     "semicolons": "Frequency (Hz); Storage [kN/m]; Loss [N/m]\n10; 310; 60000\n1; 300; 40000\n",
-    "loss factor": f"omega [rad/s]\tstorage [N/m]\teta [%]\n{SPEEDS[0]}\t3e5\t{40 / 3}\n{SPEEDS[1]}\t3.1e5\t{60 / 3.1}\n",
+    "loss factor": f"omega [rad/s]\tstorage [N/m]\teta [%]\n{SPEEDS[0]}\t3e5\t{ETA[0]}\n{SPEEDS[1]}\t3.1e5\t{ETA[1]}\n",
     "angle": f"f [Hz],modulus [N/m],loss angle [deg],T\n1,{MODULI[0]},{ANGLES[0]},20\n10,{MODULI[1]},{ANGLES[1]},20\n",
     "tangent": f"f [kHz],|K*| [N/m],tan delta [-]\n0.001,{MODULI[0]},{4 / 30}\n0.01,{MODULI[1]},{6 / 31}\n",
 }
