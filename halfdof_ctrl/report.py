@@ -30,6 +30,7 @@ from halfdof_ctrl.plots.figure_files import close_figure, save_figure
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
+from halfdof_ctrl.systems.frequency import descriptor_modes
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.working_states import working_system
 
@@ -121,8 +122,8 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     """Choose a weight of each input's square so that it costs about the energy that it stores.
 
     That is ``|B(s)^T P(s)^-1 B(s)| / 2``, half the receptance in the input's own direction, where s is the geometric
-    mean of the sizes of the finite eigenvalues (real, off all resonances): its unit makes the square of the input
-    an energy, whatever the input is.
+    mean of the sizes of the finite eigenvalues that the inputs move (real, off all resonances): its unit makes the
+    square of the input an energy, whatever the input is.
 
     Parameters
     ----------
@@ -146,8 +147,7 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     {'F_q0': 0.125}
     """
     model = dense_copy(model, "default_effort", "Give the weights.")
-    size = np.abs(pencil_structure(model).finite_eigenvalues)
-    moving = size[size > 1e-9 * size.max(initial=0.0)]
+    moving = np.abs(descriptor_modes(model.select(outputs=list(model.dofs)))[0].moving)
     s = float(np.exp(np.log(moving).mean())) if moving.size else 1.0
     motion = model.select(outputs=list(model.dofs))(s, squeeze=False)
     force = model.B + s * model.Bv + s**2 * model.Ba

@@ -2,8 +2,8 @@
 
 The condensed stiffness of springs in series on a free body is zero, and what stands there is a rounding error. It would
 make a mode of its own that no input reaches; the reduction knows which entries are rounding (`without_rounding`).
-Where a model has energy coordinates the design is done in these, which keep the slow modes of stiff structures: states of
-DOFs lose all digits of a gain at 40 elements of a beam.
+Where a model has energy coordinates the design is done in these, which keep the slow modes of stiff structures: states
+of DOFs lose all digits of a gain at 40 elements of a beam.
 """
 
 from dataclasses import dataclass

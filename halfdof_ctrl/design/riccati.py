@@ -1,11 +1,11 @@
 """The stabilizing solution of the Riccati equation, with the error of its gain.
 
-    A^T X + X A + Q - (X B + N) R^-1 (B^T X + N^T) = 0,    K = R^-1 (B^T X + N^T)          (12a)
+    A^T X + X A + Q - (X B + N) R^-1 (B^T X + N^T) = 0,    K = R^-1 (B^T X + N^T)          (30)
 
 A solver gives a first X, in states balanced by powers of two (or as they are where they have one unit already, as
 those of the energy), with R turned to the identity, with time measured by |A| and with X = g Y measured so that Q and
 B B^T are of one size: whatever the units of force, length and time, it sees the same numbers. Newton's method
-(D. L. Kleinman, 1968) then works on the residual of (12a), which is formed in about twice the working precision:
+(D. L. Kleinman, 1968) then works on the residual of (30), which is formed in about twice the working precision:
 
     (A - B K)^T dX + dX (A - B K) = -residual,    K + B^T dX.
 
@@ -42,7 +42,7 @@ SHIFTS = tuple(10.0**power for power in range(-14, -1, 2))  #: of |A|, by which 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CareProblem:
-    """Equation (12a) for N states and m inputs."""
+    """Equation (30) for N states and m inputs."""
 
     A: FloatArray
     B: FloatArray
@@ -53,7 +53,7 @@ class CareProblem:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CareSolution:
-    """The stabilizing solution of (12a)."""
+    """The stabilizing solution of (30)."""
 
     K: FloatArray  #: (m, N)
     X: FloatArray  #: (N, N)
@@ -61,7 +61,7 @@ class CareSolution:
 
 
 def solved_care(problem: CareProblem, method: Solver, *, balance: bool = True) -> CareSolution | None:
-    """Solve (12a); None where no stabilizing gain is found.
+    """Solve (30); None where no stabilizing gain is found.
 
     Parameters
     ----------
@@ -223,7 +223,7 @@ def _by_newton(problem: CareProblem, X: FloatArray | None, gain: FloatArray) -> 
 
 
 def _residual(problem: CareProblem, X: Double2) -> tuple[FloatArray, FloatArray]:
-    """Return the residual of (12a) for R = 1, and the gain, both in about twice the working precision."""
+    """Return the residual of (30) for R = 1, and the gain, both in about twice the working precision."""
     A, B, none = problem.A, problem.B, np.zeros_like
     gain = added(_plus(matrix_product(B.T, X[0]), B.T @ X[1]), (problem.N.T, none(problem.N.T)))
     motion = _plus(matrix_product(X[0], A), X[1] @ A)

@@ -7,6 +7,7 @@ from halfdof_ctrl.base.errors import FileFormatError, HalfdofError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import ARRAY_ENDINGS, variables
 from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
+from halfdof_ctrl.files.formats.table import HEAD, is_table
 from halfdof_ctrl.files.roles import families, roles_in, siblings
 
 MODEL_ENDINGS = (
@@ -105,11 +106,23 @@ def _with_matrices(files: Sequence[Path]) -> list[Path]:
     if any(path.suffix.lower() in SEVERAL for path in found):
         return found
     had = {roles[path].letter for path in found if path in roles}
-    others = [path for path in files if path in roles and path not in found and roles[path].letter not in had]
+    others = [
+        path
+        for path in files
+        if path in roles and path not in found and roles[path].letter not in had and _may_be_numbers(path)
+    ]
     signals = [
         path for path in files if path.stem in {"B", "F", "G", "H"} and path.suffix.lower() in (*TABLES, *ARRAY_ENDINGS)
     ]
     return [*found, *others, *(signals if others else [])]
+
+
+def _may_be_numbers(path: Path) -> bool:
+    """Tell a table from notes about damping."""
+    if path.suffix.lower() not in TABLES:
+        return True
+    with path.open("rb") as stream:
+        return is_table(stream.read(HEAD))
 
 
 def _holds_stiffness(path: Path) -> bool:

@@ -160,11 +160,12 @@ def with_labels(files: list[Path]) -> list[Path]:
 
 
 def matrices_of_labels(path: Path) -> list[Path]:
-    """Find the OUTPUT4 file whose rows a punch file names."""
-    if path.suffix.lower() != LABEL_FILE[".op4"] or not path.parent.is_dir():
+    """Find the files whose rows a file names: OUTPUT4 beside a punch file, the matrices of CalculiX."""
+    endings = [ending for ending, labels in LABEL_FILE.items() if labels == path.suffix.lower()]
+    wanted = [f"{path.stem}{ending}".lower() for ending in endings]
+    if not wanted or not path.parent.is_dir():
         return []
-    wanted = f"{path.stem}.op4".lower()
-    return [other for other in sorted(path.parent.iterdir()) if other.name.lower() == wanted and other.is_file()]
+    return [other for other in sorted(path.parent.iterdir()) if other.name.lower() in wanted and other.is_file()]
 
 
 def families(files: Sequence[Path]) -> list[list[Path]]:

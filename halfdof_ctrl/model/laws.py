@@ -46,7 +46,7 @@ def quadratic(c2: float, c1: float = 0.0) -> Law:
 
     Examples
     --------
-    A force of 4 N answers 2 m/s where c2 = 1, and the slope there is 2 c2 |x|:
+    A force of 4 N answers 2 m/s where c2 = 1, and the slope there is ``2 c2 |x|``:
 
     >>> oil = quadratic(1)
     >>> float(oil.inverse(4.0)), float(oil.slope(2.0))

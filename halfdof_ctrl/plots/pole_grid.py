@@ -42,7 +42,7 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
         for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
             set_scale("symlog", linthresh=linear)
             locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
-            locator.set_params(numticks=9)
+            locator.set_params(numticks=6 if axis is ax.xaxis else 9)
             axis.set_major_locator(locator)
         ax.set_xlim(min(8.0 * left, -10.0 * linear), max(8.0 * right, linear))
         top = max(8.0 * height, 10.0 * linear)

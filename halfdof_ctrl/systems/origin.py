@@ -9,10 +9,13 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 
 LARGEST_PENCIL = 500  #: DOFs up to which the pencil is asked
 SMALL = 1e-4  #: of the largest pole: where none is smaller, none can be a rounded zero
+IN_DOUBT = 1e4  #: times its bound: a pole above is no rounded zero, whatever the pencil says
+SPECK = 1e-13  #: of the next pole: one below may be the rounding of a stiffness that cancels; of k poles its k-th root
 FOURTH_ROOT = 1e-3  #: of the next pole: a pole above is no rounded zero, however many there are
 
 
@@ -42,6 +45,8 @@ def poles_of_model(model: SecondOrderModel, A: FloatArray) -> BoundedPoles:
     size = np.abs(poles.values)
     if size.min(initial=np.inf) > SMALL * size.max(initial=0.0) or len(model.dofs) > LARGEST_PENCIL:
         return poles
+    if energy_system(model) is not None:
+        return poles  # A has exact zeros for free motions, and what else is small is no rounding
     finite = pencil_structure(model.as_dense()).finite_eigenvalues
     count = int(np.count_nonzero(finite == 0.0))
     if finite.size != size.size or count <= int(np.count_nonzero(size == 0.0)):
@@ -50,6 +55,9 @@ def poles_of_model(model: SecondOrderModel, A: FloatArray) -> BoundedPoles:
     if count < size.size and size[order[count - 1]] > FOURTH_ROOT * size[order[count]]:
         return poles
     values, bounds = poles.values.copy(), poles.bounds.copy()
+    beside = SPECK ** (1.0 / count) * (size[order[count]] if count < size.size else 0.0)
+    if (size[order[:count]] > np.maximum(IN_DOUBT * bounds[order[:count]], beside)).any():
+        return poles  # plainly not zero: the pencil has lost them beside something very fast
     bounds[order[:count]] = np.maximum(bounds[order[:count]], size[order[:count]])
     values[order[:count]] = 0.0
     return BoundedPoles(values, bounds)

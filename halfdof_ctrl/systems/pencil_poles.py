@@ -1,6 +1,7 @@
-"""Poles of a model without the reduction, each with the distance that rounding of M, C, K may have moved it.
+"""Poles of a model, each with the distance that rounding of M, C, K may have moved it, whatever its outputs are.
 
-With v and w the vectors of the smallest singular value of P(s) = K + C s + M s^2 (rows and columns scaled)
+Energy coordinates give them where a model has these. Elsewhere they are the finite eigenvalues of the pencil, improved:
+with v and w the vectors of the smallest singular value of P(s) = K + C s + M s^2 (rows and columns scaled)
 
     s - w^H P(s) v / (w^H P'(s) v),    data = 2 u |w|^T (|K| + |s| |C| + |s|^2 |M|) |v| / |w^H P'(s) v|
 
@@ -12,7 +13,8 @@ import numpy as np
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, UNIT, BoundedPoles
+from halfdof_ctrl.reduction.energy.form import energy_system
+from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, UNIT, BoundedPoles, bounded_poles
 
 STEPS = 3  #: of Newton's method
 
@@ -29,6 +31,9 @@ def pencil_poles(model: SecondOrderModel) -> BoundedPoles:
     -------
     BoundedPoles
     """
+    form = energy_system(model)
+    if form is not None:
+        return bounded_poles(form.A)
     values = pencil_structure(model).finite_eigenvalues.copy()
     bounds = np.zeros(values.size)
     parts = (np.asarray(model.K), np.asarray(model.C), np.asarray(model.M))

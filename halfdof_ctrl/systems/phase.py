@@ -3,10 +3,10 @@
     phi(w) = sum_zeros th(w - z) - sum_poles th(w - p)   [- 180 deg if the gain at low frequency is negative],
     th(w - r) = atan2(w - b, |a|)  for a root r = a + jb on or left of the axis, its negative right of it
 
-A root on the axis counts as the limit of vanishing damping: a pole lowers the phase by 180 deg, a zero raises it. What
-is shown is the angle of the value itself, on the turn nearest to phi, so that any grid, even a coarse one, gives the
-same branch. Where phi and the values disagree the zeros are wrong; then the phase is followed along half circles in the
-right half plane, over each interval of the grid, where a response without roots there is smooth.
+A root on the axis counts as the limit of vanishing damping: a pole lowers the phase by 180 deg, a zero raises it.
+What is shown is the angle of the value itself, on the turn nearest to phi, so that any grid gives the same branch.
+Where phi and the values disagree the zeros are wrong; then the phase is followed along half circles in the right half
+plane, over each interval of the grid, where a response without roots there is smooth.
 """
 
 from dataclasses import dataclass

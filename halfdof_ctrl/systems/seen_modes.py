@@ -53,6 +53,7 @@ class _Cluster:
     places: npt.NDArray[np.intp]
     centre: complex
     radius: float
+    top: complex  #: where its part in a frequency response is largest
 
 
 def seen_modes(
@@ -104,7 +105,7 @@ def seen_poles(poles: BoundedPoles, response: Response, direct: FloatArray, *, r
         return SeenModes(values, poles.bounds, frequency, step)
     turn = np.exp(2j * np.pi * np.arange(POINTS_AROUND) / POINTS_AROUND)
     circles = np.concatenate([cluster.centre + cluster.radius * turn for cluster in clusters])
-    tops = np.array([1j * (abs(c.centre.imag) or abs(c.centre)) for c in clusters])
+    tops = np.array([cluster.top for cluster in clusters])
     with np.errstate(all="ignore"):
         found = response(np.concatenate([circles, tops]))
     on_circles = found[:, :, : circles.size].reshape(*found.shape[:2], len(clusters), POINTS_AROUND)
@@ -112,7 +113,7 @@ def seen_poles(poles: BoundedPoles, response: Response, direct: FloatArray, *, r
     steps = np.empty((*found.shape[:2], len(clusters)))
     for k, cluster in enumerate(clusters):
         principal = _principal_part(on_circles[:, :, k], cluster, turn)
-        frequency[cluster.places] = _is_visible(principal, cluster, complex(tops[k]), at_tops[:, :, k], real=real)
+        frequency[cluster.places] = _is_visible(principal, cluster, at_tops[:, :, k], real=real)
         sizes = np.abs(cluster.centre) ** -np.arange(1.0, len(principal) + 1.0)
         steps[:, :, k] = np.einsum("kij,k->ij", np.abs(principal), sizes)
     step |= _in_step(steps, direct, clusters, values.size)
@@ -142,7 +143,10 @@ def _clusters(values: ComplexArray, bounds: FloatArray, *, real: bool) -> list[_
         gap = float(np.abs(others - centre).min(initial=np.inf))
         spread = float(np.abs(values[own] - centre).max())
         radius = max(WITHIN * min(gap, abs(centre)), AROUND * spread)
-        clusters.append(_Cluster(own, centre, radius or abs(centre)))
+        height = abs(centre.imag) or abs(centre)
+        doubt = TOGETHER * float(bounds[own].max())
+        beside = doubt if abs(centre.real) <= doubt < height else 0.0  # where damping is rounding, H on the axis is too
+        clusters.append(_Cluster(own, centre, radius or abs(centre), complex(beside, height)))
     return clusters
 
 
@@ -156,8 +160,9 @@ def _principal_part(values: ComplexArray, cluster: _Cluster, turn: ComplexArray)
     return np.asarray(np.nan_to_num(np.array(terms)))
 
 
-def _is_visible(principal: ComplexArray, cluster: _Cluster, top: complex, value: ComplexArray, *, real: bool) -> bool:
+def _is_visible(principal: ComplexArray, cluster: _Cluster, value: ComplexArray, *, real: bool) -> bool:
     """Tell whether a cluster adds to H, where it adds most, more than a thousandth of the rest."""
+    top = cluster.top
     there = np.abs(principal).max(axis=0) > 0.0
     with np.errstate(all="ignore"):
         own = np.zeros_like(value)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import load_model
-from halfdof_ctrl.base.errors import FileFormatError, ParameterError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, ParameterError
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.files.folders import models_in
 from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
@@ -95,3 +95,23 @@ def test_what_is_no_path_is_refused(path: object) -> None:
         load_model(path)  # type: ignore[arg-type]
     with pytest.raises(FileFormatError, match="No file is given"):
         load_model({})
+
+
+def test_the_command_takes_what_the_refusal_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """--matrix C=D, and C= for none."""
+    np.savez(tmp_path / "a.npz", K=K, M=K, D=0.1 * K)
+    assert main(["info", str(tmp_path / "a.npz")]) == 2
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C=D"]) == 0
+    assert "4 states" in capsys.readouterr().out
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "D=", "--matrix", "C="]) == 0
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C"]) == 2
+    assert main(["info", "hydromount", "--triangle", "lower"]) == 2
+    assert "is built in" in capsys.readouterr().err
+
+
+def test_notes_about_damping_are_no_damping(tmp_path: Path) -> None:
+    """Beside matrices in a folder."""
+    table(tmp_path, "K.txt", "M.txt")
+    (tmp_path / "damping.txt").write_text("The damping was not measured.\n")
+    with pytest.warns(ImportedModelWarning, match=r"no damping C in K\.txt, M\.txt"):
+        load_model(tmp_path)

@@ -183,8 +183,8 @@ def test_the_report_says_why_there_is_no_regulator(tmp_path: Path) -> None:
     free = mechss(np.eye(2), np.zeros((2, 2)), np.diag([4.0, 0.0]), dofs=["a", "b"]).select("F_a", "a")
     report = write_report(free, tmp_path / "report")
     assert report.feedback is None
-    assert "no input reaches it" in report.notes[-1]
-    assert "no input reaches it" in Page((tmp_path / "report" / "index.html").read_text()).text
+    assert "the inputs reach it by" in report.notes[-1]
+    assert "the inputs reach it by" in Page((tmp_path / "report" / "index.html").read_text()).text
 
 
 @pytest.mark.usefixtures("quick")

@@ -17,9 +17,9 @@ DOF = b"5.1\n5.3\n60.2\n"
 EXPORT = Path(__file__).parents[4] / "shared" / "exports" / "calculix"
 
 
-@pytest.mark.parametrize("given", ["job.sti", "job.mas", "."])
+@pytest.mark.parametrize("given", ["job.sti", "job.mas", "job.dof", "."])
 def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
-    """From either matrix, or the folder; rows without an entry at the end are there."""
+    """From any of them, or the folder; rows without an entry at the end are there."""
     for name, content in (("job.sti", STI), ("job.mas", MAS), ("job.dof", DOF), ("other.sti.bak", b"")):
         (tmp_path / name).write_bytes(content)
     with pytest.warns(ImportedModelWarning, match="no damping C"):
