@@ -7,7 +7,7 @@ from halfdof_ctrl.base.errors import FileFormatError, HalfdofError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import ARRAY_ENDINGS, variables
 from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
-from halfdof_ctrl.files.formats.table import HEAD, is_table
+from halfdof_ctrl.files.formats.table import TABLE_HEAD, is_table
 from halfdof_ctrl.files.roles import families, roles_in, siblings
 
 MODEL_ENDINGS = (
@@ -122,7 +122,7 @@ def _may_be_numbers(path: Path) -> bool:
     if path.suffix.lower() not in TABLES:
         return True
     with path.open("rb") as stream:
-        return is_table(stream.read(HEAD))
+        return is_table(stream.read(TABLE_HEAD))
 
 
 def _holds_stiffness(path: Path) -> bool:
