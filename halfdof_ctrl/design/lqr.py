@@ -114,7 +114,10 @@ class StateFeedback:
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
         poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
-        return "\n".join([*lines, f"  closed-loop poles: {poles}", f"  gain known to {self.gain_error:.0e} of its size"])
+        lines.append(f"  closed-loop poles: {poles}")
+        if self.gain_error > WARNED:
+            lines.append(f"  gain known to {self.gain_error:.0e} of its size")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
