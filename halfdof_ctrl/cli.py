@@ -148,6 +148,12 @@ def _add_command(
         help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
     )
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
+    what = "name of a matrix in a file with several: C=D, K=sys.K, M=maa#2; C= for none"
+    parser.add_argument("--matrix", action="append", default=[], metavar="K=NAME", help=what)
+    parser.add_argument(
+        "--triangle", choices=("lower", "upper"), help="files store this triangle of symmetric matrices"
+    )
+    parser.add_argument("--remove-fixed", action="store_true", help="take out DOFs whose stiffness is 1e35 or more")
     parser.add_argument(
         "--element",
         action="append",

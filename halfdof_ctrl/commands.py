@@ -8,7 +8,7 @@ import os
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TypeAlias, overload
+from typing import TypeAlias, TypedDict, overload
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
 from halfdof_ctrl.files.folders import several_models
+from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.models import inspect_files, load_model
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
@@ -79,7 +80,7 @@ def run_info(arguments: argparse.Namespace) -> int:
         print(several, flush=True)
         return DONE
     if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
-        print(inspect_files(arguments.model), flush=True)
+        print(inspect_files(arguments.model, **_file_options(arguments)), flush=True)
     given = _given_model(arguments)
     if isinstance(given, NonlinearModel):
         print(given)
@@ -227,6 +228,9 @@ def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearM
     signals: _Signals | None = None
     model: SecondOrderModel | NonlinearModel
     if name in BUILT_IN:
+        if arguments.matrix or arguments.triangle or arguments.remove_fixed:
+            msg = f"--matrix, --triangle and --remove-fixed are about files; {name} is built in."
+            raise ParameterError(msg, parameter="--matrix", value=arguments.matrix)
         signals = BUILT_IN_SIGNALS[name]
         model = BUILT_IN[name](**_parameters(name, arguments.p))
     else:
@@ -236,13 +240,31 @@ def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearM
         if not Path(name).exists() and Path(name).suffix.lower() not in MATRIX_ENDINGS:
             msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
             raise FileFormatError(msg, path=name)
-        model = load_model(name)
+        model = load_model(name, **_file_options(arguments))
     elements = [element_from_text(text) for text in arguments.element]
     if elements:
         known = model.elements if isinstance(model, NonlinearModel) else ()
         model = nlmechss(model.linear if isinstance(model, NonlinearModel) else model, [*known, *elements])
     inputs, outputs = signals or (None, None)
     return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
+
+
+class _FileOptions(TypedDict):
+    triangle: Triangle | None
+    remove_fixed: bool
+    matrices: dict[str, str | None] | None
+
+
+def _file_options(arguments: argparse.Namespace) -> _FileOptions:
+    """Read what `load_model` is to be told about files."""
+    matrices: dict[str, str | None] = {}
+    for text in arguments.matrix:
+        letter, sign, name = text.partition("=")
+        if not (letter and sign):
+            msg = f"--matrix takes a letter and a name, K=NAME, not {text!r}."
+            raise ParameterError(msg, parameter="--matrix", value=text)
+        matrices[letter] = name or None
+    return {"triangle": arguments.triangle, "remove_fixed": arguments.remove_fixed, "matrices": matrices or None}
 
 
 def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]:

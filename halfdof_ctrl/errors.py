@@ -1,6 +1,7 @@
 """The exceptions and warnings of the package: the public path of what `base.errors` defines."""
 
 from halfdof_ctrl.base.errors import (
+    AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
     DataLimitWarning,
@@ -36,6 +37,7 @@ from halfdof_ctrl.base.errors import (
 )
 
 __all__ = [
+    "AssemblyError",
     "CloseDecisionWarning",
     "ComplexModelError",
     "DataLimitWarning",

@@ -112,6 +112,14 @@ class UncertainRankError(NoStateSpaceError):
         self.gap = gap
 
 
+class AssemblyError(HalfdofError):
+    """Parts and joints contradict each other or leave something loose; `names` are the points or parts."""
+
+    def __init__(self, message: str, *, names: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.names = names
+
+
 class ImproperError(NoStateSpaceError):
     """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
 

@@ -14,7 +14,7 @@ from halfdof_ctrl.base.arrays import ComplexArray
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
 CIRCLE_POINTS = 12  #: on a circle
-WHOLE = 0.05  #: a mean that is farther from an integer counts nothing
+WHOLE_COUNT = 0.05  #: a mean that is farther from an integer counts nothing
 TURN = 0.37  #: of the angle between points: keeps them off the real and the imaginary axis
 
 
@@ -32,7 +32,7 @@ class Contour:
         if not np.isfinite(mean):
             return None
         nearest = round(mean.real)
-        return nearest if abs(mean - nearest) <= WHOLE and nearest >= 0 else None
+        return nearest if abs(mean - nearest) <= WHOLE_COUNT and nearest >= 0 else None
 
 
 def contour(polynomial: ScaledPolynomial, center: complex, radius: float) -> Contour:

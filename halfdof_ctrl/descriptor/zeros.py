@@ -14,7 +14,7 @@ from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.descriptor.growth import system_pencil
-from halfdof_ctrl.descriptor.invariant_zeros import invariant_zeros
+from halfdof_ctrl.descriptor.minors import invariant_zeros
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.dense_copy import dense_copy
@@ -52,9 +52,10 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
 
     Notes
     -----
-    Deflation removes what the pencil has at infinity and what it has too much of rows and of columns (P. Van Dooren,
-    1979). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
-    zeros of the rank that is left.
+    Their number is exact for the stored numbers, and their values are refined as those of `pencil_structure` are. For
+    other numbers of outputs than inputs, and for dependent ones, zeros are what two random combinations of the largest
+    minors have in common (`minors`). Two outputs together vanish less often than one alone, and a model that does not
+    respond at all has the zeros of the rank that is left.
 
     Examples
     --------

@@ -6,14 +6,15 @@ from pathlib import Path
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import ARRAY_ENDINGS, variables
-from halfdof_ctrl.files.foreign import ENDINGS as FOREIGN
+from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
+from halfdof_ctrl.files.formats.table import TABLE_HEAD, is_table
 from halfdof_ctrl.files.roles import families, roles_in, siblings
 
-ENDINGS = (
+MODEL_ENDINGS = (
     ".mtx", ".mm", ".matrix", ".hb", ".rsa", ".rua", ".op4", ".pch", ".dmig", ".mapping", ".sti", ".mas", ".dof",
 )  #: of matrices of programs, which a folder is searched for  # fmt: skip
 TABLES = (".txt", ".csv", ".tsv", ".dat", ".out", ".asc")  #: searched for under the names of matrices alone
-LABELS = (".mapping", ".dof")
+LABEL_ENDINGS = (".mapping", ".dof")
 SEVERAL = (".op4", ".pch", ".dmig")  #: that hold several matrices, whatever their names
 
 
@@ -57,7 +58,7 @@ def models_in(folder: Path) -> list[list[Path]]:
 def _only_names_rows(path: Path, others: Sequence[Path]) -> bool:
     """Return whether a file names rows: a mapping, or the punch file beside an OUTPUT4 file."""
     suffix = path.suffix.lower()
-    return suffix in LABELS or (suffix == ".pch" and path.with_suffix(".op4") in others)
+    return suffix in LABEL_ENDINGS or (suffix == ".pch" and path.with_suffix(".op4") in others)
 
 
 def several_models(folder: Path) -> str:
@@ -88,10 +89,11 @@ def _in_folder(folder: Path) -> list[Path]:
     elif len(single := [path for path in files if path.suffix.lower() in ARRAY_ENDINGS]) == 1:
         return single
     else:
-        foreign = next((FOREIGN[path.suffix.lower()] for path in files if path.suffix.lower() in FOREIGN), None)
+        suffixes = [path.suffix.lower() for path in files]
+        foreign = next((FOREIGN_ENDINGS[suffix] for suffix in suffixes if suffix in FOREIGN_ENDINGS), None)
         hint = f" {foreign[0][0].upper()}{foreign[0][1:]} is not read. Instead: {foreign[1]}." if foreign else ""
         msg = (
-            f"{folder}: this folder holds no file that ends in {', '.join(ENDINGS)}, and no {', '.join(TABLES)}, "
+            f"{folder}: this folder holds no file that ends in {', '.join(MODEL_ENDINGS)}, and no {', '.join(TABLES)}, "
             f"{', '.join(ARRAY_ENDINGS)} with the name of a matrix. {known}Give its files by name.{hint}"
         )
     raise FileFormatError(msg, path=str(folder))
@@ -99,16 +101,28 @@ def _in_folder(folder: Path) -> list[Path]:
 
 def _with_matrices(files: Sequence[Path]) -> list[Path]:
     """Return the files of programs, and tables and arrays under the name of a matrix that these do not have."""
-    found = [path for path in files if path.suffix.lower() in ENDINGS]
-    roles = roles_in([path for path in files if path.suffix.lower() in (*ENDINGS, *TABLES, *ARRAY_ENDINGS)])
+    found = [path for path in files if path.suffix.lower() in MODEL_ENDINGS]
+    roles = roles_in([path for path in files if path.suffix.lower() in (*MODEL_ENDINGS, *TABLES, *ARRAY_ENDINGS)])
     if any(path.suffix.lower() in SEVERAL for path in found):
         return found
     had = {roles[path].letter for path in found if path in roles}
-    others = [path for path in files if path in roles and path not in found and roles[path].letter not in had]
+    others = [
+        path
+        for path in files
+        if path in roles and path not in found and roles[path].letter not in had and _may_be_numbers(path)
+    ]
     signals = [
         path for path in files if path.stem in {"B", "F", "G", "H"} and path.suffix.lower() in (*TABLES, *ARRAY_ENDINGS)
     ]
     return [*found, *others, *(signals if others else [])]
+
+
+def _may_be_numbers(path: Path) -> bool:
+    """Tell a table from notes about damping."""
+    if path.suffix.lower() not in TABLES:
+        return True
+    with path.open("rb") as stream:
+        return is_table(stream.read(TABLE_HEAD))
 
 
 def _holds_stiffness(path: Path) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 MATRIX_OUTPUT = "*MATRIX GENERATE and *MATRIX OUTPUT write matrices as text (job_STIF1.mtx)"
 EXTSEOUT = "EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH) writes a .pch file, EXTSEOUT(...,MATOP4=45) an .op4 file"
 HBMAT = "HBMAT in /AUX2 writes STIFF, MASS and DAMP of a .full file in ASCII, with a .mapping file"
-ENDINGS = {
+FOREIGN_ENDINGS = {
     ".full": ("ANSYS' binary file of matrices", HBMAT),
     ".emat": ("ANSYS' binary file of element matrices", HBMAT),
     ".sub": ("a binary superelement of ANSYS", HBMAT),
@@ -32,21 +32,21 @@ ENDINGS = {
 }  #: by ending: what it is, and what to write instead
 OCTAVE = (b"# Created by Octave", b"Octave-1")
 BEGINNINGS = (
-    (b"\x89HDF\r\n\x1a\n", *ENDINGS[".h5"]),
+    (b"\x89HDF\r\n\x1a\n", *FOREIGN_ENDINGS[".h5"]),
     (b"PK\x03\x04", "an archive", "unpack it, or save a spreadsheet as csv"),
     (b"\x1f\x8b", "a packed file", "unpack it"),
     (b"BZh", "a packed file", "unpack it"),
     (b"\xfd7zXZ", "a packed file", "unpack it"),
-    (b"\x80\x03", *ENDINGS[".pkl"]),
-    (b"\x80\x04", *ENDINGS[".pkl"]),
-    (b"\x80\x05", *ENDINGS[".pkl"]),
+    (b"\x80\x03", *FOREIGN_ENDINGS[".pkl"]),
+    (b"\x80\x04", *FOREIGN_ENDINGS[".pkl"]),
+    (b"\x80\x05", *FOREIGN_ENDINGS[".pkl"]),
     (OCTAVE[0], "a workspace of Octave in its own text format", "save('-v7', 'model.mat', 'M', 'C', 'K')"),
     (OCTAVE[1], "a workspace of Octave in its own binary format", "save('-v7', 'model.mat', 'M', 'C', 'K')"),
     (b"\xff\xfe", "text in UTF-16", "save it as UTF-8"),
     (b"\xfe\xff", "text in UTF-16", "save it as UTF-8"),
 )
 OP2 = b"NASTRAN FORT TAPE ID CODE"
-PEEK = 512
+FOREIGN_PEEK = 512
 
 
 def foreign_kind(path: Path, content: bytes) -> str | None:
@@ -57,8 +57,8 @@ def foreign_kind(path: Path, content: bytes) -> str | None:
 as text (job_STIF1.mtx).'
     """
     found = next((words for start, *words in BEGINNINGS if content.startswith(start)), None)
-    if found is None and OP2 in content[:PEEK]:
-        found = list(ENDINGS[".op2"])
-    if found is None and path.suffix.lower() in ENDINGS:
-        found = list(ENDINGS[path.suffix.lower()])
+    if found is None and OP2 in content[:FOREIGN_PEEK]:
+        found = list(FOREIGN_ENDINGS[".op2"])
+    if found is None and path.suffix.lower() in FOREIGN_ENDINGS:
+        found = list(FOREIGN_ENDINGS[path.suffix.lower()])
     return None if found is None else f"this is {found[0]}, which is not read. Instead: {found[1]}."

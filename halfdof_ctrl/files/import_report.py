@@ -57,8 +57,10 @@ class MatrixReport:
     def rank(self) -> str:
         """Rank and definiteness in words."""
         known = self.inertia.rank
-        motions = self.inertia.zero if self.known_to > EPS and not self.inertia.negative else 0
-        digits = f", {motions} zero to the file's {digits_in_words(self.known_to)}" if motions else ""
+        rounded = self.letter == "K" and self.known_to > EPS and not self.inertia.negative
+        motions = self.inertia.zero if rounded else 0
+        words = f", {motions} zero to the file's {digits_in_words(self.known_to)}: rigid-body motions"
+        digits = words if motions else ""
         part = "" if self.asymmetry <= SYMMETRIC and not self.is_complex else " (of the symmetric real part)"
         return self.inertia.in_words + part + ("" if known is None else f", rank {known}") + digits
 

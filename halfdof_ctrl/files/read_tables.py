@@ -11,27 +11,31 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.files.containers import PathLike, ending
+from halfdof_ctrl.files.stiffness_tables import is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD
 
 
 def load_response(path: PathLike) -> control.FrequencyResponseData | control.TimeResponseData:
-    """Read a response that `save_response` wrote.
+    """Read a response that `save_response` wrote, or a table of a measured dynamic stiffness.
 
     Parameters
     ----------
     path : path-like
-        Ends in ``.csv``.
+        Ends in ``.csv``. Columns of a measured stiffness have names and units, such as ``f [Hz], K' [N/mm], K''
+        [N/mm]``, ``frequency [Hz]; modulus [N/m]; loss angle [deg]`` or ``f [Hz], storage [MPa], loss factor [-]``,
+        with commas, semicolons or tabs between.
 
     Returns
     -------
     control.FrequencyResponseData or control.TimeResponseData
         With the values and names that were saved, to the last bit. Of a time response outputs and times; its states
-        and inputs are not in the table.
+        and inputs are not in the table. A stiffness has the output ``stiffness`` [N/m] or [Pa]: for `fit_prony` take
+        ``data.omega / (2 * pi)`` and ``data.frdata[0, 0]``.
 
     Raises
     ------
     FileFormatError
-        Another ending, or a table that is not one of `save_response`; `line` says where.
+        Another ending, a table of neither kind, a stiffness without units; `line` says where.
     OSError
         The file cannot be read.
 
@@ -47,17 +51,27 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     """
     ending(path, TABLE_ENDINGS)
     with Path(path).open(encoding="utf-8-sig", newline="") as stream:
-        rows = list(csv.reader(stream))
+        text = stream.read()
+    rows = list(csv.reader(text.splitlines(), delimiter=_separator(text)))
     header = rows[0] if rows else []
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
         return _frequency_response(header, _numbers(rows, path), path)
     if header[:1] == [TIME_HEAD]:
         return _time_response(header[1:], _numbers(rows, path))
+    if is_stiffness_table(header):
+        return stiffness_response(header, _numbers(rows, path), path)
     msg = (
         f"{path}: the first line is no header of a response: it must begin with {FREQUENCY_HEAD[0]!r} and "
-        f"{FREQUENCY_HEAD[1]!r}, or with {TIME_HEAD!r}, as save_response writes it."
+        f"{FREQUENCY_HEAD[1]!r}, or with {TIME_HEAD!r}, as save_response writes it; or name the columns of a measured "
+        "stiffness with their units, such as f [Hz], K' [N/m], K'' [N/m]."
     )
     raise FileFormatError(msg, path=str(path), line=1)
+
+
+def _separator(text: str) -> str:
+    """Tell what stands between the columns of the first line."""
+    first = text.partition("\n")[0]
+    return next((mark for mark in (";", "\t") if mark in first), ",")
 
 
 def _numbers(rows: Sequence[Sequence[str]], path: PathLike) -> FloatArray:

@@ -37,7 +37,11 @@ PATTERNS = tuple(
     )
 )
 LONG_WORDS = tuple(word for word in sorted(ROLE_WORDS, key=len, reverse=True) if len(word) > 1)
-LABELS = {".op4": ".pch", ".sti": ".dof", ".mas": ".dof"}  #: ending of the file with the names of rows; else .mapping
+LABEL_FILE = {
+    ".op4": ".pch",
+    ".sti": ".dof",
+    ".mas": ".dof",
+}  #: ending of the file with names of rows; else .mapping
 SETS = "gg|aa|ff|ll|nn|oo|tt|pp|dd|hh|jj|xx"
 NASTRAN = re.compile(rf"(?P<kind>k4|k2?|m2?|b2?)({SETS})x?\d*", re.IGNORECASE)
 NASTRAN_LETTERS = {"k4": "S", "k": "K", "k2": "K", "m": "M", "m2": "M", "b": "C", "b2": "C"}
@@ -88,8 +92,8 @@ def roles_in(files: Iterable[Path]) -> dict[Path, FileRole]:
 
 def _plain_roles(path: Path) -> Iterator[FileRole]:
     """Return what a name says by itself."""
-    if path.suffix.lower() in calculix.LETTERS:
-        yield FileRole(calculix.LETTERS[path.suffix.lower()], (path.stem.lower(), ""))
+    if path.suffix.lower() in calculix.KIND_BY_ENDING:
+        yield FileRole(calculix.KIND_BY_ENDING[path.suffix.lower()], (path.stem.lower(), ""))
     for pattern in PATTERNS:
         match = pattern.fullmatch(path.stem)
         if match is not None:
@@ -126,7 +130,7 @@ def siblings(path: Path) -> list[Path]:
     """Find the files beside it that hold the other matrices of the same model, by their names."""
     if not path.is_file() or not [*_plain_roles(path), *_loose_roles(path)]:
         return []
-    endings = set(calculix.LETTERS) if path.suffix.lower() in calculix.LETTERS else {path.suffix.lower()}
+    endings = set(calculix.KIND_BY_ENDING) if path.suffix.lower() in calculix.KIND_BY_ENDING else {path.suffix.lower()}
     others = [
         other
         for other in sorted(path.parent.iterdir())
@@ -147,7 +151,7 @@ def with_labels(files: list[Path]) -> list[Path]:
     """Add the files of the same name that tell the names of rows, whatever their capitals."""
     found = dict.fromkeys(files)
     for path in files:
-        ending = LABELS.get(path.suffix.lower(), ".mapping")
+        ending = LABEL_FILE.get(path.suffix.lower(), ".mapping")
         wanted = (path.stem + ending).lower()
         for other in sorted(path.parent.iterdir()) if path.parent.is_dir() else ():
             if other.name.lower() == wanted and other.is_file():
@@ -156,11 +160,12 @@ def with_labels(files: list[Path]) -> list[Path]:
 
 
 def matrices_of_labels(path: Path) -> list[Path]:
-    """Find the OUTPUT4 file whose rows a punch file names."""
-    if path.suffix.lower() != LABELS[".op4"] or not path.parent.is_dir():
+    """Find the files whose rows a file names: OUTPUT4 beside a punch file, the matrices of CalculiX."""
+    endings = [ending for ending, labels in LABEL_FILE.items() if labels == path.suffix.lower()]
+    wanted = [f"{path.stem}{ending}".lower() for ending in endings]
+    if not wanted or not path.parent.is_dir():
         return []
-    wanted = f"{path.stem}.op4".lower()
-    return [other for other in sorted(path.parent.iterdir()) if other.name.lower() == wanted and other.is_file()]
+    return [other for other in sorted(path.parent.iterdir()) if other.name.lower() in wanted and other.is_file()]
 
 
 def families(files: Sequence[Path]) -> list[list[Path]]:
@@ -172,7 +177,7 @@ def families(files: Sequence[Path]) -> list[list[Path]]:
     roles = roles_in(files)
     groups: dict[tuple[str, ...], list[Path]] = {}
     for path in files:
-        key: tuple[str, ...] = (path.suffix.lower() if path.suffix.lower() not in calculix.LETTERS else ".sti",)
+        key: tuple[str, ...] = (path.suffix.lower() if path.suffix.lower() not in calculix.KIND_BY_ENDING else ".sti",)
         key += roles[path].family if path in roles else ("", path.name, "")
         groups.setdefault(key, []).append(path)
     return list(groups.values())

@@ -45,17 +45,27 @@ def require_clear_letters(
         if letter not in MEANING or letter in told or matrix.shape != (n, n) or not matrix.nnz:
             continue
         damping_is_said = "C" in found.matrices or said.get("C", "") is None
-        if damping_is_said and not (letter == "G" and _is_skew(matrix)):
+        other = _other_reading(letter, matrix, found) if damping_is_said else "the damping"
+        if not other:
             continue
-        other = "gyroscopic forces (add it to C)" if damping_is_said else "the damping"
-        name = source.raw.title or letter
-        argument = f"matrices={{'C': {name!r}}}" if source.raw.named else f"{{'C': {source.path.name!r}, ...}}"
-        choices = f"matrices={{{letter!r}: {name!r}}} for the other, or matrices={{{letter!r}: None}} to leave it out"
+        name = repr(source.raw.title if source.raw.named else source.path.name)
+        as_damping, as_signal = f"{{'C': {name}}}", f"{{{letter!r}: {name}}}"
+        if source.raw.named:
+            as_damping, as_signal = f"matrices={as_damping}", f"matrices={as_signal}"
+        choices = f"{as_signal} for the other, or matrices={{{letter!r}: None}} to leave it out"
         msg = (
             f"{source.path}: {letter} in {source.path.name} is {n} x {n}, as large as the stiffness, and could be "
-            f"{other} or {MEANING[letter]}. Say {argument} for damping, {choices}."
+            f"{other} or {MEANING[letter]}. Say {as_damping} for damping, {choices}."
         )
         raise FileFormatError(msg, path=str(source.path))
+
+
+def _other_reading(letter: str, matrix: csc_array, found: Sources) -> str:
+    """Tell what a matrix beside M, C and K may be in their equations, nothing if its letter is clear."""
+    if letter == "G" and _is_skew(matrix):
+        return "gyroscopic forces (add it to C)"
+    has_signals = {"B", "F", "G", "H"} & set(found.signals) or {"inputs", "outputs"} & set(found.texts)
+    return "" if letter != "D" or has_signals else "another matrix of the equations"
 
 
 def aligned_signals(found: Sources, names: Sequence[str], *, labelled: bool) -> tuple[dict[str, Any], list[str]]:

@@ -253,7 +253,7 @@ def _read_text(path: Path, content: bytes, room: int, *, is_signal: bool) -> lis
     if harwell_boeing.is_harwell_boeing(content):
         return [harwell_boeing.read_harwell_boeing(content)]
     foreign = foreign_kind(path, content)
-    if foreign is None and suffix in calculix.LETTERS and table.is_table(content):
+    if foreign is None and suffix in calculix.KIND_BY_ENDING and table.is_table(content):
         return [calculix.read_calculix(content, suffix, room)]
     if dmig.has_dmig(content):
         return dmig.read_dmig(content)

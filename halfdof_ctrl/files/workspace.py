@@ -18,15 +18,16 @@ from halfdof_ctrl.base.arrays import EPS, checked_matrix
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
-from halfdof_ctrl.files.formats.digits import SINGLE
+from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
-from halfdof_ctrl.files.formats.variables import PLANE, Variable
+from halfdof_ctrl.files.formats.variables import PLANE, Variable, another_kind
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
-TEXTS = ("dofs", "inputs", "outputs", "prescribed", "elements")
-ROUNDING = "known_to"  #: variable with the relative rounding of the entries
+TEXT_VARIABLES = ("dofs", "inputs", "outputs", "prescribed", "elements")
+ROUNDING_VARIABLE = "known_to"  #: variable with the relative rounding of the entries
 STATE_SPACE = {"A", "B", "C", "D"}
+SAVED_TEXTS = ("elements",)  #: which save_model writes as text; a workspace may have a table of that name
 OWN_LAYOUT = {"B", "F", "D", "dofs", "inputs", "outputs"}  #: all of which save_model writes
 GUESSES = {
     "K": ("k", "kk", r"k_?\d*", r"k(_|mat|glob|full|red).*", r".*(_k|stiff?\w*)", r"k\w{1,3}"),
@@ -63,19 +64,35 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         The file is damaged, or what is called M, C or K is no matrix.
     """
     found = variables(content, is_archive=is_archive)
+    if len(found) == 1 and not found[0].name and found[0].kind != "matrix":  # of a .npy file, there is nothing else
+        found[0].read()
+        raise another_kind("it")
     named = {variable.name: variable for variable in found}
     if set(named) >= STATE_SPACE and not titles and not {"K", "M"} & set(named):
         msg = "no stiffness K in the file, which holds a state space A, B, C, D. Read it by load_system."
         raise FileFormatError(msg, path="")
     chosen = _chosen(found, titles)
-    others = [variable for variable in found if variable.name not in (*TEXTS, "name", ROUNDING)]
+    others = [
+        variable
+        for variable in found
+        if variable.name not in (*TEXT_VARIABLES, "name", ROUNDING_VARIABLE) or variable.is_matrix
+    ]
     if not set(chosen) & set(SQUARE):
-        single = [variable for variable in others if variable.is_matrix]
+        single = [variable for variable in others if variable.is_matrix] or [
+            variable for variable in others if variable.kind == "matrix" and len(variable.shape) == PLANE
+        ]
         if len(single) == 1 and single[0] not in chosen.values():
             chosen = {None: single[0]}
     if not titles:
         _require_matrices(chosen, others)
-    names = {key: named[key].read() for key in (*TEXTS, "name") if key in named}
+    own_layout = set(named) >= OWN_LAYOUT
+    size = next((variable.shape[0] for variable in chosen.values() if variable.shape), 0)
+    called = [
+        key
+        for key in (*TEXT_VARIABLES, "name")
+        if key in named and (own_layout or _names_signals(key, named[key], size))
+    ]
+    names = {key: named[key].read() for key in called}
     dofs = texts(names, "dofs")
     rounding = _rounding(named)
     taken = [id(variable) for variable in chosen.values()]
@@ -85,8 +102,21 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         ),
         left=tuple([variable for variable in others if id(variable) not in taken and variable.name]),
         texts=names,
-        own_layout=set(named) >= OWN_LAYOUT,
+        own_layout=own_layout,
     )
+
+
+def _names_signals(key: str, variable: Variable, size: int) -> bool:
+    """Tell names of DOFs and signals from what else is called dofs, inputs, elements in a workspace."""
+    if key in SAVED_TEXTS:
+        return variable.kind == "text" or (variable.kind == "cell" and all(_is_text(part) for part in variable.parts()))
+    if variable.kind == "matrix":  # as many numbers as there are DOFs are meant as their names, and refused as such
+        return key == "dofs" and variable.shape in {(size,), (size, 1), (1, size)}
+    return variable.kind in {"text", "cell", "object"}
+
+
+def _is_text(variable: Variable) -> bool:
+    return variable.kind == "text"
 
 
 def _require_matrices(chosen: Mapping[str | None, Variable], others: Sequence[Variable]) -> None:
@@ -174,7 +204,7 @@ def _proposal(found: Sequence[Variable]) -> str:
 
 
 def _rounding(named: Mapping[str, Variable]) -> float:
-    variable = named.get(ROUNDING)
+    variable = named.get(ROUNDING_VARIABLE)
     value = float(np.asarray(variable.read()).item()) if variable is not None and variable.kind == "matrix" else EPS
     return value if EPS <= value < 1.0 else EPS
 
@@ -196,7 +226,7 @@ def _raw(letter: str | None, variable: Variable, dofs: list[str] | None, roundin
         dofs=checked_dofs(dofs, rows) if dofs is not None and is_square and rows == columns else None,
         named=bool(variable.name),
         dense=dense,
-        known_to=SINGLE if single else rounding,
+        known_to=SINGLE_ROUNDING if single else rounding,
     )
 
 

@@ -12,6 +12,7 @@ along each step, whose derivative rises, finds it; where a slope is zero or infi
 variable after the other is solved for inside its bracket, which lowers h at every turn. Elsewhere damped Newton.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -88,77 +89,99 @@ def coupled_solver(group: Group) -> Solver:
     return _convex_solver(group) if group.is_convex else _plain_solver(group)
 
 
-def _convex_solver(group: Group) -> Solver:  # noqa: C901  # four closures over one group
-    s, V = np.linalg.eigh(0.5 * (group.S + group.S.T))
-    kept = s > RANK * s.max()
-    s, V = s[kept], V[:, kept]
-    g = np.diag(group.G)
-    by_turns = _turns(group) if kept.all() else None
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Potential:
+    """The function h of (N5) for springs and dampers, by its gradient and its Hessian."""
 
-    def gradient(t: float, w_0: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-        w = w_0 + V @ y
-        beyond = group.force(w, t) - g * w
-        return y / s + V.T @ beyond, beyond
+    s: FloatArray  #: (k,) singular values of S
+    V: FloatArray  #: (r, k)
+    g: FloatArray  #: (r,) tangents in the linear part
+    laws: tuple[Law, ...]
 
-    def newton(t: float, w_0: FloatArray, y: FloatArray) -> tuple[FloatArray, bool]:
-        down, beyond = gradient(t, w_0, y)
-        for _ in range(MOST_STEPS):
-            w = w_0 + V @ y
-            if _is_flat(down, y / s, V.T @ beyond, EPS):
-                return y, True
-            step = _newton_step(np.diag(1.0 / s) + V.T @ ((np.diag(group.slope(w, t)) - g)[:, None] * V), down, 1.0 / s)
-            if step is None:
-                break
-            y = _along(lambda at: gradient(t, w_0, at)[0], y, step, down)
-            down, beyond = gradient(t, w_0, y)
-            if not np.isfinite(down).all():
-                return y, False
-            if _is_settled(V @ step, np.concatenate([w, w_0])):
-                return y, True
-        return y, _is_flat(down, y / s, V.T @ beyond, LOOSE)
+    @classmethod
+    def of(cls, group: Group) -> "_Potential":
+        s, V = np.linalg.eigh(0.5 * (group.S + group.S.T))
+        kept = s > RANK * s.max()
+        laws = tuple([place.element.law for place in group.places])  # type: ignore[union-attr]
+        return cls(s=s[kept], V=V[:, kept], g=np.diag(group.G).copy(), laws=laws)  # type: ignore[arg-type]
 
-    def solve(t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray] | None:
-        y, settled = newton(t, w_0, np.zeros(s.size))
+    def beyond(self, w: FloatArray) -> FloatArray:
+        """Return f(w) - G w."""
+        return np.array([float(law.force(x)) for law, x in zip(self.laws, w.tolist(), strict=True)]) - self.g * w
+
+    def gradient(self, w_0: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the two terms of the gradient at y."""
+        return y / self.s, self.V.T @ self.beyond(w_0 + self.V @ y)
+
+    def hessian(self, w: FloatArray) -> FloatArray:
+        """Return the second derivative, with a large number for an infinite slope."""
+        slopes = np.array([float(law.slope(x)) for law, x in zip(self.laws, w.tolist(), strict=True)])
+        return np.asarray(np.diag(1.0 / self.s) + (self.V.T * (np.minimum(slopes, STEEPEST) - self.g)) @ self.V)
+
+
+def _convex_solver(group: Group) -> Solver:
+    h = _Potential.of(group)
+    by_turns = _turns(group) if h.s.size == group.rows.size else None
+
+    def solve(t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray] | None:  # noqa: ARG001  # laws know no time
+        y, settled = _newton(h, w_0)
+        w = w_0 + h.V @ y
         if not settled and by_turns is not None:
-            w = by_turns(w_0, w_0 + V @ y)
-            if w is None:
+            found = by_turns(w_0, w)
+            if found is None:
                 return None
-            y, settled = V.T @ (w - w_0), True
-        w = w_0 + V @ y
-        return (w, -(group.force(w, t) - g * w)) if settled and np.isfinite(w).all() else None
+            w, settled = found, True
+        return (w, -h.beyond(w)) if settled and np.isfinite(w).all() else None
 
     return solve
 
 
-def _is_flat(down: FloatArray, one: FloatArray, two: FloatArray, share: float) -> bool:
+def _newton(h: _Potential, w_0: FloatArray) -> tuple[FloatArray, bool]:
+    """Minimize h from y = 0; tell whether it settled."""
+    y = np.zeros(h.s.size)
+    one, two = h.gradient(w_0, y)
+    for _ in range(MOST_STEPS):
+        if _is_flat(one, two, EPS):
+            return y, True
+        down, w = one + two, w_0 + h.V @ y
+        step = _newton_step(h.hessian(w), down, h.s)
+        if step is None:
+            break
+        y = _along(h, w_0, y, step, float(down @ step))
+        one, two = h.gradient(w_0, y)
+        if not np.isfinite(two).all():
+            return y, False
+        if _is_settled(h.V @ step, np.concatenate([w, w_0])):
+            return y, True
+    return y, _is_flat(one, two, LOOSE)
+
+
+def _is_flat(one: FloatArray, two: FloatArray, share: float) -> bool:
     """Tell whether a gradient is no more than this share of its two terms."""
-    return bool((np.abs(down) <= share * (np.abs(one) + np.abs(two))).all())
+    return bool((np.abs(one + two) <= share * (np.abs(one) + np.abs(two))).all())
 
 
-def _newton_step(hessian: FloatArray, down: FloatArray, scale: FloatArray) -> FloatArray | None:
+def _newton_step(hessian: FloatArray, down: FloatArray, s: FloatArray) -> FloatArray | None:
     """Return a step down; where a slope is zero and the Hessian singular, a shorter one along what is left of it."""
     for shift in SHIFTS:
         try:
-            factor = scipy.linalg.cho_factor(hessian + shift * np.diag(scale))
-        except (np.linalg.LinAlgError, ValueError):
+            step = -np.linalg.solve(hessian + np.diag(shift / s) if shift else hessian, down)
+        except np.linalg.LinAlgError:
             continue
-        step = -scipy.linalg.cho_solve(factor, down)
         if np.isfinite(step).all() and down @ step < 0.0:
             return np.asarray(step)
     return None
 
 
-def _along(
-    gradient: Callable[[FloatArray], FloatArray], y: FloatArray, step: FloatArray, down: FloatArray
-) -> FloatArray:
+def _along(h: _Potential, w_0: FloatArray, y: FloatArray, step: FloatArray, first: float) -> FloatArray:
     """Go along a step to where the derivative of h has fallen to less than half; it rises along the step."""
-    first = float(down @ step)
     low, high, at = 0.0, 1.0, 1.0
     for _ in range(MOST_HALVINGS):
-        derivative = float(gradient(y + at * step) @ step)
-        if np.isfinite(derivative) and (abs(derivative) <= 0.5 * abs(first) or (derivative < 0.0 and at == 1.0)):
+        one, two = h.gradient(w_0, y + at * step)
+        derivative = float((one + two) @ step)
+        if math.isfinite(derivative) and (abs(derivative) <= 0.5 * abs(first) or (derivative < 0.0 and at == 1.0)):
             break
-        low, high = (at, high) if np.isfinite(derivative) and derivative < 0.0 else (low, at)
+        low, high = (at, high) if math.isfinite(derivative) and derivative < 0.0 else (low, at)
         at = 0.5 * (low + high)
     return y + at * step
 

@@ -216,6 +216,8 @@ def _sizes(
     tolerances = COARSE * COARSE * guess
     run = _Run.of(reduction, forcing, times, COARSE * guess)
     states, done = run.integrate(x_0, COARSE, tolerances, method, show=False)
+    if done < times.size:  # stopped by the user before anything was done that could be kept
+        raise KeyboardInterrupt
     return _filled(np.maximum(np.abs(states[:, :done]).max(axis=1), np.abs(x_0)), reduction)
 
 

@@ -17,14 +17,14 @@ from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import Matrix
-from halfdof_ctrl.base.errors import ParameterError, SignalNameError
+from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
 from halfdof_ctrl.model.elements import Damper, Spring
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.parts.joints import AnyJoint, AssemblyError, Joint, Rigid
+from halfdof_ctrl.parts.joints import AnyJoint, Joint, Rigid
 from halfdof_ctrl.parts.part_signals import assembled_signals
 from halfdof_ctrl.parts.points import Points, block_diagonal, points_of
 from halfdof_ctrl.parts.ties import Row, Ties

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
-from halfdof_ctrl.base.errors import HalfdofError
 from halfdof_ctrl.model.elements import Damper, Spring
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -53,11 +52,3 @@ class Joint:
 
 
 AnyJoint: TypeAlias = Rigid | Spring | Damper | Joint
-
-
-class AssemblyError(HalfdofError):
-    """Parts and joints contradict each other or leave something loose; `names` are the culprits."""
-
-    def __init__(self, message: str, *, names: tuple[str, ...]) -> None:
-        super().__init__(message)
-        self.names = names

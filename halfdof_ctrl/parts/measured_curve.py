@@ -20,6 +20,7 @@ Weight: TypeAlias = Literal["relative", "absolute", "parts"]
 WEIGHTS: tuple[Weight, ...] = get_args(Weight)
 THIRD_DIFFERENCES = 20.0  #: sum of the squares of 1, 3, 3, 1
 NORMAL_MEDIAN = 0.6745  #: of the size of a normal variable, in standard deviations
+COMPLEX_MEDIAN = 0.8326  #: of the size of a complex one, the root of log 2
 SIGMAS = 4.0  #: a negative loss beyond so many times the scatter is no scatter
 ROUNDING = 1e-12  #: of |K|: a negative loss below is none
 FEWEST = 2  #: points of a curve
@@ -85,10 +86,11 @@ def scatter(values: npt.NDArray[np.inexact]) -> float:
     return float(np.sqrt(np.mean(np.abs(third) ** 2) / THIRD_DIFFERENCES)) if third.size else 0.0
 
 
-def _typical_scatter(values: FloatArray) -> float:
+def typical_scatter(values: npt.NDArray[np.inexact]) -> float:
     """Estimate the same from the median, which a few points that are far off do not move."""
     third = np.abs(np.diff(values, 3))
-    return float(np.median(third) / NORMAL_MEDIAN / np.sqrt(THIRD_DIFFERENCES)) if third.size else 0.0
+    median = COMPLEX_MEDIAN if np.iscomplexobj(values) else NORMAL_MEDIAN
+    return float(np.median(third) / median / np.sqrt(THIRD_DIFFERENCES)) if third.size else 0.0
 
 
 def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple[FloatArray, ComplexArray]:
@@ -120,7 +122,7 @@ def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple
 def _require_loss(f: FloatArray, K: ComplexArray) -> None:
     """Refuse loss that is negative by more than its scatter."""
     sine = K.imag / np.abs(K)
-    bound = max(SIGMAS * min(scatter(sine), _typical_scatter(sine)), ROUNDING)
+    bound = max(SIGMAS * min(scatter(sine), typical_scatter(sine)), ROUNDING)
     negative = sine < -bound
     if not negative.any() and np.count_nonzero(sine < -ROUNDING) <= f.size / 2:
         return

@@ -19,11 +19,7 @@ def assembled_signals(
     """Give inputs and outputs: those of DOFs that are left, of points, and whatever else parts have."""
     models = list(parts.values())
     size = len(dofs)
-    unit = (
-        csc_array(np.eye(size))
-        if size == left
-        else csc_array(coo_array((np.ones(left), (range(left), range(left))), shape=(size, left)))
-    )
+    unit = csc_array(coo_array((np.ones(left), (np.arange(left), np.arange(left))), shape=(size, left)))
     inputs, input_places = _own_signals(parts, "input")
     outputs, output_places = _own_signals(parts, "output")
     result: dict[str, Any] = {"dofs": dofs}

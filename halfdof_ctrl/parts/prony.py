@@ -18,7 +18,7 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.fluid_column import FluidColumn, fluid_column
-from halfdof_ctrl.parts.measured_curve import MeasuredCurve, Weight, measured_curve, scatter
+from halfdof_ctrl.parts.measured_curve import MeasuredCurve, Weight, measured_curve, scatter, typical_scatter
 from halfdof_ctrl.parts.prony_search import MOST_BRANCHES, best_series, chosen_order, criterion, lag_one, rms
 from halfdof_ctrl.parts.prony_series import Series
 from halfdof_ctrl.parts.rubber import generalized_maxwell
@@ -145,7 +145,10 @@ def fit_prony(
     most = _most_branches(curve, branches)
     found = best_series(curve, most)
     orders = tuple([_order(curve, series) for _, series in sorted(found.best.items())])
-    wanted = chosen_order(curve, found.best) if branches is None else max(n for n in found.best if n <= branches)
+    if branches is None:
+        wanted = chosen_order(curve, found.best, rms(curve, found.grid))
+    else:
+        wanted = max(order for order in found.best if order <= branches)
     series = found.best[wanted]
     follows = _follows(curve, series, found.grid)
     fluid = None if follows else fluid_column(curve)
@@ -179,12 +182,17 @@ def _weighted_residual(curve: MeasuredCurve, series: Series) -> ComplexArray:
     return np.asarray(curve.weights[0] * rest.real + 1j * curve.weights[1] * rest.imag)
 
 
+def _noise(rest: ComplexArray) -> float:
+    """Estimate the scatter from neighbours; a sharp peak that stays in the residual is none, hence the median."""
+    return min(scatter(rest), typical_scatter(rest))
+
+
 def _follows(curve: MeasuredCurve, series: Series, grid: Series) -> bool:
     """Tell whether the residual is scatter: no series follows if the best of all, and the one chosen, leave more."""
     for candidate in (series, grid):
         rest = _weighted_residual(curve, candidate)
         size = rms(curve, candidate)
-        if size <= VISIBLE or size <= ABOVE_SCATTER * scatter(rest) or lag_one(rest) <= IN_ROWS:
+        if size <= VISIBLE or size <= ABOVE_SCATTER * _noise(rest) or lag_one(rest) <= IN_ROWS:
             return True
     return False
 
@@ -225,7 +233,7 @@ def _fit(
         residual=read_only((curve.values - series.values(curve.omega)) * unit),
         rms=rms(curve, series),
         floor=floor,
-        scatter=scatter(rest),
+        scatter=_noise(rest),
         orders=orders,
         follows=follows,
         fluid=fluid,
@@ -262,11 +270,11 @@ def _verdict(
 ) -> str:
     if follows:
         size = rms(curve, series)
-        return f"A Maxwell series follows the curve: rms {size:.1e}, scatter {scatter(rest):.1e}, floor {floor:.1e}."
+        return f"A Maxwell series follows the curve: rms {size:.1e}, scatter {_noise(rest):.1e}, floor {floor:.1e}."
     worst = float(curve.omega[int(np.argmax(np.abs(rest)))] * curve.omega_unit / (2.0 * np.pi))
     words = (
         f"No Maxwell series follows this curve: the best of all leaves {floor:.1e}, the scatter is "
-        f"{scatter(rest):.1e}, most at {worst:.4g} Hz."
+        f"{_noise(rest):.1e}, most at {worst:.4g} Hz."
     )
     if fluid is None:
         return words

@@ -27,6 +27,7 @@ SMOOTH = 1e-5  #: scatter of a curve that was computed, not measured
 PERHAPS_EXACT = 3e-3  #: the same, where it is worth a trial
 HOPEFUL = 0.03  #: rms up to which rates of a rational function are refined
 EXACT = 1e-11  #: rms of a series that is the curve
+CLOSE_TO_FLOOR = 1.05  #: of the floor: with fewer branches than this takes something is left of the curve
 NEAR_FLOOR = 1.01  #: a series so close to the floor needs no more branches
 MERGES = 3  #: best merges of an order that are tried
 SWAP_POINTS = 40  #: rates that are tried in the place of one of a series
@@ -180,10 +181,13 @@ def criterion(curve: MeasuredCurve, series: Series) -> float:
     return count * float(np.log(max(series.cost, float(np.finfo(float).tiny)) / count)) + penalty
 
 
-def chosen_order(curve: MeasuredCurve, best: dict[int, Series]) -> int:
-    """Choose the first order that is the curve itself, else the one of the least criterion."""
+def chosen_order(curve: MeasuredCurve, best: dict[int, Series], floor: float) -> int:
+    """Choose the first order that is the curve itself, else that of the least criterion among those near the floor."""
     exact = [order for order in sorted(best) if rms(curve, best[order]) < EXACT]
-    return exact[0] if exact else min(sorted(best), key=lambda order: criterion(curve, best[order]))
+    if exact:
+        return exact[0]
+    close = [order for order in sorted(best) if rms(curve, best[order]) <= CLOSE_TO_FLOOR * floor]
+    return min(close or sorted(best), key=lambda order: criterion(curve, best[order]))
 
 
 def lag_one(residual: ComplexArray) -> float:

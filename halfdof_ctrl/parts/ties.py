@@ -15,9 +15,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.sparse import coo_array, csc_array
 
+from halfdof_ctrl.base.errors import AssemblyError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
-from halfdof_ctrl.parts.joints import AssemblyError
 
 Row = dict[int, float]
 

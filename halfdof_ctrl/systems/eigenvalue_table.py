@@ -14,7 +14,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 SAME_PAIR = 1e-8  #: relative distance to the conjugate at which two eigenvalues are one pair
 NO_INERTIA = "infinite"
-HEAD = ("descriptor form", "state space", "difference")
+TABLE_TITLES = ("descriptor form", "state space", "difference")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -34,7 +34,7 @@ class EigenvalueTable:
 
     def __repr__(self) -> str:
         """Print as a table."""
-        rows = [HEAD, *self.rows]
+        rows = [TABLE_TITLES, *self.rows]
         widths = [max(len(row[column]) for row in rows) + 3 for column in range(2)]
         lines = [
             f"{before:<{widths[0]}}{after:<{widths[1]}}{difference}".rstrip() for before, after, difference in rows

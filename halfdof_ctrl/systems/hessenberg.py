@@ -35,7 +35,7 @@ RISK = 1e-11  #: bound of the relative error above which a response is corrected
 
 
 def state_space_response(
-    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, points: ComplexArray, share: FloatArray | None = None
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, points: ComplexArray
 ) -> ComplexArray:
     """Evaluate ``C (s I - A)^-1 B + D``.
 
@@ -45,8 +45,6 @@ def state_space_response(
         State space; balanced here by powers of two.
     points : (k,) complex ndarray
         Where to evaluate, s [rad/s] or z.
-    share : (p, m, k) ndarray, optional
-        Filled with what is left of the state in an output, ``|C_i x| / (|C_i| |x|)`` (or the same for the inputs).
 
     Returns
     -------
@@ -62,22 +60,15 @@ def state_space_response(
     inputs, outputs = np.asarray(B / scale[:, None]), np.asarray(C * scale)
     batch = max(1, POINT_ENTRIES // A.shape[0])
     if B.shape[1] <= C.shape[0]:
-        _add_channels(values, balanced, inputs, outputs, points, batch, share)
+        _add_channels(values, balanced, inputs, outputs, points, batch)
     else:
-        left = None if share is None else np.swapaxes(share, 0, 1)
-        _add_channels(np.swapaxes(values, 0, 1), balanced.T, outputs.T, inputs.T, points, batch, left)
+        _add_channels(np.swapaxes(values, 0, 1), balanced.T, outputs.T, inputs.T, points, batch)
     values[np.isnan(values)] = complex(np.inf, np.nan)
     return values
 
 
 def _add_channels(
-    values: ComplexArray,
-    A: FloatArray,
-    B: FloatArray,
-    C: FloatArray,
-    points: ComplexArray,
-    batch: int,
-    share: FloatArray | None,
+    values: ComplexArray, A: FloatArray, B: FloatArray, C: FloatArray, points: ComplexArray, batch: int
 ) -> None:
     """Add ``C (s I - A)^-1 B`` to values (p, m, k), an input at a time."""
     adjoints: dict[int, ShiftedSolver] = {}
@@ -90,10 +81,7 @@ def _add_channels(
             x = solver.solve(part)
             with np.errstate(invalid="ignore", over="ignore"):
                 response = _real_times_complex(rotated, x)
-                norms = _column_norms(x)
-                if share is not None:
-                    share[:, j, start : start + batch] = np.abs(response) / (norms * lengths[:, None])
-                bound = EPS * size * norms**2 * lengths[:, None] / abs(solver.beta)
+                bound = EPS * size * _column_norms(x) ** 2 * lengths[:, None] / abs(solver.beta)
                 small = bound > RISK * np.abs(response)
                 hopeless = bound > np.abs(response)
             for i in np.flatnonzero(hopeless.any(axis=1)).tolist():

@@ -13,7 +13,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 
 MOST_SWEEPS = 50  #: through all DOFs; some ten are enough
-SETTLED = 0.25  #: a change of an exponent by less is none
+SETTLED_EXPONENT = 0.25  #: a change of an exponent by less is none
 DEEPEST = 20  #: powers of two below the balanced time: slower modes, and those at the origin, count as there
 POWER_STEPS = 16  #: of the iteration for the size of the slowest mode, the second half of which counts
 
@@ -68,7 +68,7 @@ def _balanced(log: FloatArray, dof: IndexArray, order: IndexArray, time: float |
             step = _step(log, units[dof] + order * rate, order > 0)
             rate += step
             change = max(change, abs(step))
-        if change < SETTLED:
+        if change < SETTLED_EXPONENT:
             break
     return units, rate
 

@@ -8,6 +8,7 @@ import pytest
 
 from halfdof_ctrl.base import errors
 from halfdof_ctrl.base.errors import (
+    AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
     FileFormatError,
@@ -34,6 +35,7 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.files.naming import naming_the_file
 
 EXAMPLES: list[HalfdofError] = [
+    AssemblyError("Nothing holds part a", names=("a",)),
     LawError("bounded", element="damper 1 (coulomb)", dofs=("y2",)),
     NoAnswerError("stops", element="damper 1 (table)", dofs=("y2",), time=0.5, force=7.0, state=(0.0, 1.0)),
     MatrixError("K is empty", matrix="K"),

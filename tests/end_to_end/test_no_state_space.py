@@ -51,4 +51,4 @@ def test_all_fall_back_in_the_same_cases(model: SecondOrderModel, why: str, monk
     assert legend_texts(bode_plot(model, OMEGA)) == [f"descriptor form (no state space: {why})"]
     pole_map_plot(model)
     eigenvalues = pencil_structure(model).finite_eigenvalues
-    assert_allclose(sweep(model, compute="poles").poles, eigenvalues, rtol=SAME)
+    assert_allclose(np.asarray(sweep(model, compute="poles").poles), eigenvalues, rtol=SAME)

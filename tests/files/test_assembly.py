@@ -1,12 +1,13 @@
 """Claims about putting matrices on one list of DOFs, and what the report says of them."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
@@ -21,10 +22,10 @@ def laid(folder: Path, **files: str | bytes) -> Path:
     return folder
 
 
-def dense(part: csc_array | None) -> np.ndarray:
+def dense(part: Any) -> npt.NDArray[Any]:  # noqa: ANN401  # dense or sparse
     """Expand a matrix that must be there."""
     assert part is not None
-    return part.toarray()
+    return np.asarray(part.toarray())
 
 
 def require_chain(found: ImportedModel) -> None:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import load_model
-from halfdof_ctrl.base.errors import FileFormatError, ParameterError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, ParameterError
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.files.folders import models_in
-from halfdof_ctrl.files.foreign import ENDINGS
+from halfdof_ctrl.files.foreign import FOREIGN_ENDINGS
 
 K = np.array([[2.0, -1.0], [-1.0, 2.0]])
 
@@ -46,7 +46,7 @@ def test_a_folder_with_one_archive_is_that_model(tmp_path: Path) -> None:
     np.testing.assert_array_equal(load_model(tmp_path).C, K)
 
 
-@pytest.mark.parametrize("ending", sorted(ENDINGS))
+@pytest.mark.parametrize("ending", sorted(FOREIGN_ENDINGS))
 def test_files_that_are_not_read_are_called_by_their_name(tmp_path: Path, ending: str) -> None:
     """With the way to what is read."""
     path = tmp_path / f"job{ending}"
@@ -66,7 +66,7 @@ def test_numbers_that_matlab_saves_as_text_are_a_table(tmp_path: Path) -> None:
     """By save -ascii K.mat."""
     np.savetxt(tmp_path / "K.mat", K)
     model = load_model(tmp_path / "K.mat", matrices={"M": None, "C": None})
-    assert model.K.toarray().tolist() == K.tolist()  # type: ignore[union-attr]
+    assert model.K.toarray().tolist() == K.tolist()
 
 
 @pytest.mark.parametrize(
@@ -95,3 +95,23 @@ def test_what_is_no_path_is_refused(path: object) -> None:
         load_model(path)  # type: ignore[arg-type]
     with pytest.raises(FileFormatError, match="No file is given"):
         load_model({})
+
+
+def test_the_command_takes_what_the_refusal_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """--matrix C=D, and C= for none."""
+    np.savez(tmp_path / "a.npz", K=K, M=K, D=0.1 * K)
+    assert main(["info", str(tmp_path / "a.npz")]) == 2
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C=D"]) == 0
+    assert "4 states" in capsys.readouterr().out
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "D=", "--matrix", "C="]) == 0
+    assert main(["info", str(tmp_path / "a.npz"), "--matrix", "C"]) == 2
+    assert main(["info", "hydromount", "--triangle", "lower"]) == 2
+    assert "is built in" in capsys.readouterr().err
+
+
+def test_notes_about_damping_are_no_damping(tmp_path: Path) -> None:
+    """Beside matrices in a folder."""
+    table(tmp_path, "K.txt", "M.txt")
+    (tmp_path / "damping.txt").write_text("The damping was not measured.\n")
+    with pytest.warns(ImportedModelWarning, match=r"no damping C in K\.txt, M\.txt"):
+        load_model(tmp_path)

@@ -275,7 +275,8 @@ def loaded(path: Path) -> SecondOrderModel | str:
         warnings.simplefilter("error", HalfdofWarning)
         warnings.filterwarnings("ignore", "(?!.*(last number|no mass|no damping))", ImportedModelWarning)
         try:
-            return load_model(path)
+            model: SecondOrderModel = load_model(path)
+            return model  # noqa: TRY300  # the annotation says which of the two kinds it is
         except ImportedModelWarning as doubt:
             return str(doubt)
         except HalfdofError as refusal:

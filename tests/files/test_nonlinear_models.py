@@ -49,7 +49,13 @@ def test_a_function_is_not_kept(tmp_path: Path) -> None:
 
 def test_elements_that_are_none_are_refused_by_the_file(tmp_path: Path) -> None:
     """Text in a file is parsed, never run."""
-    np.savez(tmp_path / "bad.npz", K=np.eye(1), M=np.eye(1), elements=np.array(['["damper", "q0", null, "exec(1)"]']))
+    np.savez(
+        tmp_path / "bad.npz",
+        K=np.eye(1),
+        M=np.eye(1),
+        C=np.zeros((1, 1)),
+        elements=np.array(['["damper", "q0", null, "exec(1)"]']),
+    )
     with pytest.raises(FileFormatError, match=r"bad.npz: There is no law 'exec'"):
         load_model(tmp_path / "bad.npz")
 

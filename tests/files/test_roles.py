@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from halfdof_ctrl.files.roles import nastran_letter, role_of, roles_in, siblings, with_labels
+from halfdof_ctrl.files.roles import matrices_of_labels, nastran_letter, role_of, roles_in, siblings, with_labels
 
 
 @pytest.mark.parametrize(
@@ -120,3 +120,12 @@ def test_names_that_differ_in_the_word_alone_are_siblings(tmp_path: Path, names:
         assert sorted(path.name for path in siblings(tmp_path / name)) == sorted(set(names) - {name})
     roles = roles_in([tmp_path / name for name in names])
     assert [role.letter for role in roles.values()] == ["K", "M", "C"]
+
+
+def test_a_punch_file_finds_its_output4_file(tmp_path: Path) -> None:
+    """And the names of CalculiX their matrices, whatever the capitals."""
+    for name in ("se.pch", "SE.OP4", "other.op4", "job.dof", "job.sti", "job.mas"):
+        (tmp_path / name).touch()
+    assert [path.name for path in matrices_of_labels(tmp_path / "se.pch")] == ["SE.OP4"]
+    assert [path.name for path in matrices_of_labels(tmp_path / "job.dof")] == ["job.mas", "job.sti"]
+    assert matrices_of_labels(tmp_path / "job.sti") == []

@@ -33,9 +33,7 @@ def written(path: Path, variables: dict[str, Any]) -> Path:
 
 def is_the_model(model: SecondOrderModel) -> bool:
     """Compare with the matrices above, to the last bit."""
-    parts = [
-        np.asarray(part.toarray() if scipy.sparse.issparse(part) else part) for part in (model.M, model.C, model.K)
-    ]
+    parts = [part if isinstance(part, np.ndarray) else part.toarray() for part in (model.M, model.C, model.K)]
     return all(np.array_equal(part, wanted) for part, wanted in zip(parts, (M, C, K), strict=True))
 
 
@@ -169,7 +167,7 @@ def test_files_side_by_side_are_one_model(tmp_path: Path, ending: str) -> None:
 def test_a_matrix_of_save_npz_is_what_its_file_is_called(tmp_path: Path) -> None:
     """In the three layouts that say where each entry is."""
     for letter, layout in zip("MCK", ("csc", "csr", "coo"), strict=True):
-        scipy.sparse.save_npz(tmp_path / f"{letter}.npz", scipy.sparse.coo_array(MODEL[letter]).asformat(layout))
+        scipy.sparse.save_npz(tmp_path / f"{letter}.npz", scipy.sparse.coo_array(MODEL[letter]).asformat(layout))  # type: ignore[call-overload]
     model = load_model(tmp_path)
     assert model.is_sparse
     assert is_the_model(model)
@@ -194,6 +192,12 @@ def test_options_mean_the_same_for_every_kind_of_file(tmp_path: Path) -> None:
     np.testing.assert_array_equal(model.B, np.eye(2))
 
 
+def test_numbers_called_like_names_are_left_alone(tmp_path: Path) -> None:
+    """A finite-element program in MATLAB has tables of elements, fixed DOFs, counts."""
+    tables = {"elements": np.ones((7, 2)), "dofs": np.arange(6.0), "inputs": 3.0, "outputs": {"a": 1.0}, "name": 5.0}
+    assert is_the_model(load_model(written(tmp_path / "a.mat", {**MODEL, **tables})))
+
+
 def test_a_state_space_is_called_one(tmp_path: Path) -> None:
     """Its C is no damping."""
     np.savez(tmp_path / "a.npz", A=np.eye(2), B=np.eye(2), C=np.eye(2), D=np.eye(2))
@@ -208,3 +212,28 @@ def test_what_save_model_wrote_comes_back_without_a_word(tmp_path: Path) -> None
     back = load_model(tmp_path / "a.npz")
     np.testing.assert_array_equal(back.K, np.tril(K))
     assert back.known_to == model.known_to
+
+
+def test_an_array_of_objects_or_names_is_no_missing_mass(tmp_path: Path) -> None:
+    """A file that is there is read or refused."""
+    np.save(tmp_path / "K.npy", K)
+    for mass in (np.array([1, None], dtype=object), np.array(["a"])):
+        np.save(tmp_path / "M.npy", mass, allow_pickle=True)
+        with pytest.raises(FileFormatError, match=r"M\.npy: it (holds|is) "):
+            load_model(tmp_path)
+
+
+def test_an_array_of_one_number_is_a_model_of_one_dof(tmp_path: Path) -> None:
+    """In files of one matrix each."""
+    for letter, value in (("M", 2.0), ("C", 0.5), ("K", 8.0)):
+        np.save(tmp_path / f"{letter}.npy", np.array([[value]]))
+    model = load_model(tmp_path / "K.npy")
+    assert (float(model.M[0, 0]), float(model.C[0, 0]), float(model.K[0, 0])) == (2.0, 0.5, 8.0)
+
+
+def test_a_d_beside_the_damping_is_a_direct_term_only_where_there_are_signals(tmp_path: Path) -> None:
+    """Forces on all DOFs that appear in all displacements are nobody's model."""
+    with pytest.raises(FileFormatError, match="another matrix of the equations or a direct term"):
+        load_model(written(tmp_path / "a.npz", {**MODEL, "D": np.eye(3)}))
+    model = load_model(written(tmp_path / "b.npz", {**MODEL, "D": np.eye(3), "B": np.eye(3), "F": np.eye(3)}))
+    np.testing.assert_array_equal(model.D, np.eye(3))

@@ -10,7 +10,7 @@ import halfdof_ctrl as hd
 
 def test_dir_shows_the_public_names() -> None:
     """Neither rooms nor what the package imports; completion in a notebook asks for this."""
-    assert dir(hd) == sorted([*hd.__all__, "__version__", "errors"])
+    assert dir(hd) == sorted([*hd.__all__, "__version__", "errors", "laws"])
 
 
 @pytest.mark.parametrize("name", hd.__all__)

@@ -39,7 +39,7 @@ def test_an_element_counts_as_if_its_slope_were_generic(
 def test_print_tells_what_the_elements_made() -> None:
     """A static DOF that a spring alone holds, a half one by two elements, and nothing of DOFs that were so before."""
     K = [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]
-    elements = [
+    elements: list[Spring | Damper | Force] = [
         Spring("q0", "q1", laws.cubic(1.0, 2.0)),
         Spring("q1", law=laws.cubic(3.0)),
         Damper("q2", law=SQUARE),

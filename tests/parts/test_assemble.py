@@ -11,9 +11,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import halfdof_ctrl as hd
 import halfdof_ctrl.nonlinear.reduction  # registers what nlmechss asks
-from halfdof_ctrl.base.errors import ParameterError, SignalNameError
+from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
+from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.model.nonlinear import NonlinearModel
-from halfdof_ctrl.parts.joints import AnyJoint, AssemblyError
+from halfdof_ctrl.parts.joints import AnyJoint
 
 BY_HAND = 1e-14  # the same sums in another order
 SOLVED = 1e-10  # two formulations of one model, each by a solve
@@ -281,3 +282,19 @@ def test_newcomers_model_needs_no_list_for_one_joint() -> None:
     paper = hd.hydromount(m=2)
     for found, desired in ((model.M, paper.M), (model.C, paper.C), (model.K, paper.K)):
         assert_array_equal(found, desired)
+
+
+def test_large_sparse_part_is_joined_without_anything_dense() -> None:
+    """A plate of 22 500 DOFs on two mounts: a dense matrix of its size would take 4 GB."""
+    n = 150
+    line = sp.diags_array([[-1.0] * (n - 1), [2.0] * n, [-1.0] * (n - 1)], offsets=[-1, 0, 1])
+    K = sp.csc_array(sp.kron(line, sp.eye_array(n)) + sp.kron(sp.eye_array(n), line))
+    plate = hd.mechss(sp.csc_array(sp.eye_array(n * n)), None, K).select("F_q7", "q7")
+    model = hd.assemble(
+        {"plate": plate, "a": hd.zener(1, 2, 3), "b": hd.zener(1, 2, 3)},
+        joints=[hd.Rigid("plate_q100", "a_top"), hd.Rigid("plate_q9000", "b_top")],
+        ground=["a_bottom", "b_bottom"],
+    )
+    assert model.is_sparse
+    assert len(model.dofs) == n * n + 2
+    assert as_sparse(model.K).nnz == K.nnz + 2 * 3  # each half DOF: its own entry and two that tie it

@@ -1,6 +1,6 @@
 """Dynamic stiffness and transmissibility plots by the data in their lines, their labels and legends."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -31,14 +31,6 @@ Plot = Callable[..., Any]
 STIFFNESS: Plot = partial(dynamic_stiffness_plot, dof="y")
 TRANSMISSIBILITY: Plot = partial(transmissibility_plot, from_="y", to="y2")
 PLOTS = pytest.mark.parametrize("plot", [STIFFNESS, TRANSMISSIBILITY], ids=["stiffness", "transmissibility"])
-
-
-@pytest.fixture(autouse=True)
-def _no_figures_left() -> Iterator[None]:
-    """Close what others left, and what a test drew."""
-    plt.close("all")
-    yield
-    plt.close("all")
 
 
 def mount(C_h: float = 300.0) -> SecondOrderModel:

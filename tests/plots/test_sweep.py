@@ -20,11 +20,10 @@ ROUNDING = 1e-12  #: in degrees
 
 
 @pytest.fixture(autouse=True)
-def _no_figures_left() -> Iterator[None]:
-    """Close what a test drew, and keep small problems to one thread."""
+def _one_thread() -> Iterator[None]:
+    """Keep small problems to one thread."""
     with limited_threads(1):
         yield
-    plt.close("all")
 
 
 def damped(c: float, k: float = 1.0) -> SecondOrderModel:

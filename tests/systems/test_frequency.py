@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import descriptor_response, frequency_response, hydromount, mech2ss, mechss
 from halfdof_ctrl.base.errors import ParameterError, SingularPencilError
-from halfdof_ctrl.systems.frequency import checked_frequencies, default_frequencies
+from halfdof_ctrl.systems.default_grid import default_frequencies
+from halfdof_ctrl.systems.frequency import checked_frequencies
 from support.structures import Structure, damped_structures
 
 AGREEMENT = 1e-10  # two routes, relative to the channel's largest value

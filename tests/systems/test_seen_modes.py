@@ -61,7 +61,8 @@ def test_undamped_poles_that_reach_the_output_are_seen_others_not() -> None:
     """The middle of three equal masses stands still in the second mode."""
     K = 2.0 * np.eye(3) - np.eye(3, k=1) - np.eye(3, k=-1)
     sys = mech2ss(mechss(np.eye(3), None, K).select("F_q1", "q1"))
-    modes = seen_modes(*(np.asarray(part) for part in (sys.A, sys.B, sys.C, sys.D)))
+    A, B, C, D = (np.asarray(part) for part in (sys.A, sys.B, sys.C, sys.D))
+    modes = seen_modes(A, B, C, D)
     seen = np.sort(modes.moving.imag[modes.moving.imag > 0.0])
     assert_allclose(seen, np.sqrt([2.0 - np.sqrt(2.0), 2.0 + np.sqrt(2.0)]), rtol=1e-12)
 

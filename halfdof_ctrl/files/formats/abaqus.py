@@ -32,7 +32,7 @@ Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
 MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
-BLOCK = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
+MATRIX_INPUT = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
 SCALE = re.compile(rb"^\*\s*matrix[^\n]*\bscale\s+factor\s*=\s*([^\s,]+)", re.IGNORECASE | re.MULTILINE)
 ELSEWHERE = re.compile(rb"^\*\s*matrix[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
 LOAD = re.compile(rb"^\*\s*cload", re.IGNORECASE | re.MULTILINE)
@@ -74,7 +74,7 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     """
     columns = data_columns(content)
     has_keywords = b"*" in content
-    if has_keywords and (ELSEWHERE.search(content) or len(BLOCK.findall(content)) > 1):
+    if has_keywords and (ELSEWHERE.search(content) or len(MATRIX_INPUT.findall(content)) > 1):
         msg = (
             "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read. Give the "
             "file with the numbers, or write each matrix into its own."

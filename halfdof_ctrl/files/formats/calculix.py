@@ -17,7 +17,7 @@ from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 
-LETTERS = {".sti": "K", ".mas": "M"}  #: by the ending of the file
+KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
 LABEL = re.compile(rb"(\d{1,10})\.(\d{1,2})")
 COLUMNS = 3
@@ -59,7 +59,7 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
         (size, size),
         declared="symmetric" if one_sided else "unsymmetric",
         format="CalculiX",
-        letter=LETTERS[ending],
+        letter=KIND_BY_ENDING[ending],
         open_size=True,
         known_to=known_to(content),
     )

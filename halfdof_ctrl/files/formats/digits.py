@@ -11,13 +11,13 @@ from halfdof_ctrl.base.arrays import EPS
 
 SAMPLE = 2**17  #: bytes at the start and at the end that are looked at; a file has one format
 NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
-FULL = 16  #: digits from which numbers are as good as float64
+FULL_DIGITS = 16  #: digits from which numbers are as good as float64
 SURE = 6  #: digits from which few numbers of full length tell a format
 FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
-SHORT = 4  #: digits of the shortest format that is believed,
+FEWEST_DIGITS = 4  #: digits of the shortest format that is believed,
 MANY, MOST = 8, 0.5  #: and numbers of full length, and their share, that it takes
 MOST_NUMBERS = 20_000
-SINGLE = 2.0**-24  #: rounding of four-byte numbers
+SINGLE_ROUNDING = 2.0**-24  #: rounding of four-byte numbers
 
 
 def digits_of(content: bytes) -> int | None:
@@ -38,8 +38,8 @@ def digits_of(content: bytes) -> int | None:
     longest = max(lengths, default=0)
     full = lengths.count(longest)
     sure = longest >= SURE and full >= max(FEW, SHARE * len(lengths))
-    likely = longest >= SHORT and full >= max(MANY, MOST * len(lengths))
-    return longest if (sure or likely) and longest < FULL else None
+    likely = longest >= FEWEST_DIGITS and full >= max(MANY, MOST * len(lengths))
+    return longest if (sure or likely) and longest < FULL_DIGITS else None
 
 
 def known_to(content: bytes) -> float:
@@ -51,10 +51,10 @@ def known_to(content: bytes) -> float:
 def digits_in_words(rounding: float) -> str:
     """Name a rounding by its digits.
 
-    >>> digits_in_words(5e-10), digits_in_words(SINGLE)
+    >>> digits_in_words(5e-10), digits_in_words(SINGLE_ROUNDING)
     ('10 digits', 'single precision')
     """
-    if rounding == SINGLE:
+    if rounding == SINGLE_ROUNDING:
         return "single precision"
     count = 1
     while 0.5 * 10.0 ** (1 - count) > rounding * (1.0 + SHARE):

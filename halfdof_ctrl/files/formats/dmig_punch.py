@@ -22,8 +22,8 @@ Keys = npt.NDArray[np.int64]
 
 KEYWORD, LARGE_KEYWORD = b"DMIG", b"DMIG*   "
 FIELD = 16  #: characters
-FIRST = 8  #: characters before the fields
-FULL = FIRST + 4 * FIELD
+LEAD = 8  #: characters before the fields
+FULL_LINE = LEAD + 4 * FIELD
 COMPONENT_BITS, MOST_COMPONENT = 3, 6
 BLANK = 32
 
@@ -62,11 +62,11 @@ def punched_matrices(content: bytes) -> list[PunchedMatrix] | None:
             in_entry = in_entry and line.startswith((b"+", b" "))
             continue
         in_entry = True
-        if line[FIRST + 8 : FIRST + 16].strip() == b"0" and line[:FIRST] == b"DMIG    ":
+        if line[LEAD + 8 : LEAD + 16].strip() == b"0" and line[:LEAD] == b"DMIG    ":
             blocks.append((line, [], [], []))
             if stop > number + 1:
                 return None
-        elif not blocks or line[:FIRST] != LARGE_KEYWORD or line[FIRST:24].strip() != blocks[-1][0][FIRST:16].strip():
+        elif not blocks or line[:LEAD] != LARGE_KEYWORD or line[LEAD:24].strip() != blocks[-1][0][LEAD:16].strip():
             return None
         else:
             blocks[-1][1].append(line)
@@ -79,9 +79,9 @@ def punched_matrices(content: bytes) -> list[PunchedMatrix] | None:
 
 
 def _matrix(header: bytes, columns: Sequence[bytes], rows: Sequence[bytes], counts: Sequence[int]) -> PunchedMatrix:
-    column_keys = _keys(_fields(columns, FIRST + FIELD, 2))
-    row_keys = _keys(_fields(rows, FIRST, 2))
-    if any(len(line) > FULL for line in (*columns, *rows)) or any(b"$" in line for line in rows):
+    column_keys = _keys(_fields(columns, LEAD + FIELD, 2))
+    row_keys = _keys(_fields(rows, LEAD, 2))
+    if any(len(line) > FULL_LINE for line in (*columns, *rows)) or any(b"$" in line for line in rows):
         msg = "more than four fields, or a remark"
         raise ValueError(msg)
     text = header.decode("latin-1").ljust(72)
@@ -89,7 +89,7 @@ def _matrix(header: bytes, columns: Sequence[bytes], rows: Sequence[bytes], coun
         header=[text[place : place + 8] for place in range(8, 72, 8)],
         rows=row_keys,
         columns=np.repeat(column_keys, np.array(counts, dtype=np.int64)),
-        values=_fields([line.translate(AS_PYTHON) for line in rows], FIRST + 2 * FIELD, 2),
+        values=_fields([line.translate(AS_PYTHON) for line in rows], LEAD + 2 * FIELD, 2),
     )
 
 

@@ -21,13 +21,13 @@ from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
 from halfdof_ctrl.files.formats.variables import Value, Variable
 
-HEADER = 20  #: bytes of the five integers
+MAT4_HEADER = 20  #: bytes of the five integers
 PRECISIONS = ("f8", "f4", "i4", "i2", "u2", "u1")
 FULL, TEXT, SPARSE = 0, 1, 2
 BIG_ENDIAN = 1000
 MOST_TYPE = 5000
 LONGEST_NAME = 64
-NAME = re.compile(rb"[A-Za-z]\w*\Z")
+VARIABLE_NAME = re.compile(rb"[A-Za-z]\w*\Z")
 TRIPLET = 3
 
 
@@ -81,7 +81,7 @@ def mat4_variables(content: bytes) -> list[Variable]:
 
 def _header(content: bytes, place: int) -> _Header | None:
     for order in "<>":
-        words = np.frombuffer(content[place : place + HEADER].ljust(HEADER, b"\xff"), order + "i4").tolist()
+        words = np.frombuffer(content[place : place + MAT4_HEADER].ljust(MAT4_HEADER, b"\xff"), order + "i4").tolist()
         kind, rows, columns, is_complex, length = words
         big, rest = divmod(kind, BIG_ENDIAN)
         precision, what = divmod(rest, 10)
@@ -95,8 +95,8 @@ def _header(content: bytes, place: int) -> _Header | None:
             and is_complex in {0, 1}
             and 1 < length <= LONGEST_NAME
         )
-        name, end = content[place + HEADER : place + HEADER + length - 1], place + HEADER + length
-        if sound and NAME.match(name) and content[end - 1 : end] == b"\0":
+        name, end = content[place + MAT4_HEADER : place + MAT4_HEADER + length - 1], place + MAT4_HEADER + length
+        if sound and VARIABLE_NAME.match(name) and content[end - 1 : end] == b"\0":
             dtype = np.dtype(order + PRECISIONS[precision])
             return _Header(name.decode("latin-1"), what, dtype, (rows, columns), bool(is_complex), end)
     return None

@@ -22,16 +22,15 @@ from scipy.sparse import csc_array
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, another_kind, require_room
+from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, require_room
 
-HEADER = 128  #: bytes; the last two tell the byte order
+MAT5_HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
-PEEK = 2**12  #: bytes that hold the name of a variable
+NAME_PEEK = 2**12  #: bytes that hold the name of a variable
 MATRIX, COMPRESSED = 14, 15
 NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
+TEXT_ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
 CELL, STRUCT, CHAR, SPARSE, OPAQUE = 1, 2, 4, 5, 17
-MOST_PARTS = 1000  #: of a struct or cell array that are listed
 DEEPEST = 4  #: structs in structs that are looked into
 NUMERIC = range(6, 16)
 COMPLEX_FLAG, LOGICAL_FLAG = 0x800, 0x200
@@ -63,10 +62,10 @@ def mat5_variables(content: bytes) -> list[Variable]:
     ValueError, zlib.error
         The bytes are damaged or end too early.
     """
-    if content.startswith(b"MATLAB 7.3") or content[HEADER - 4 : HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
+    if content.startswith(b"MATLAB 7.3") or content[MAT5_HEADER - 4 : MAT5_HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
         msg = "this is a MATLAB 7.3 (HDF5) file. Save it with  save(file, ..., '-v7')."
         raise FileFormatError(msg, path="")
-    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
+    order = {b"IM": "<", b"MI": ">"}.get(content[MAT5_HEADER - 2 : MAT5_HEADER])
     if order is None:
         msg = "this is no MATLAB version 5 file (or only the beginning of one). Save it with  save(file, ..., '-v7')."
         raise FileFormatError(msg, path="")
@@ -74,7 +73,7 @@ def mat5_variables(content: bytes) -> list[Variable]:
 
 
 def _packed_variables(content: bytes, order: str) -> list[tuple[int, bytes]]:
-    elements = _Bytes(content, order, HEADER)
+    elements = _Bytes(content, order, MAT5_HEADER)
     found = []
     while elements:
         found.append(elements.element())
@@ -213,7 +212,7 @@ def _variable(kind: int, data: bytes, order: str) -> _Bytes:
 
 def _peeked(data: bytes, order: str) -> tuple[int, bytes]:
     """Unpack the beginning of a variable."""
-    start = zlib.decompressobj().decompress(data, PEEK)
+    start = zlib.decompressobj().decompress(data, NAME_PEEK)
     kind, _ = np.frombuffer(_Bytes(start, order).take(TAG), order + "u4").tolist()
     return kind, start[TAG:]
 
@@ -311,9 +310,9 @@ def _cell(name: str, body: _Bytes) -> str:
 def _rows(head: _Head, body: _Bytes) -> list[str]:
     """Read a char array, which is stored by columns, as one text a row."""
     kind, data = body.element()
-    if kind in TEXTS:
+    if kind in TEXT_ENCODINGS:
         ending = {"<": "-le", ">": "-be"}[body.order] if kind in (17, 18) else ""
-        text = data.decode(TEXTS[kind] + ending)
+        text = data.decode(TEXT_ENCODINGS[kind] + ending)
     else:
         text = body.as_numbers(kind, data).astype("<u2").tobytes().decode("utf-16-le")
     letters = np.array(list(text), dtype=np.str_) if len(text) == _count(head.shape) else _units(text)

@@ -19,12 +19,11 @@ from scipy.sparse import csc_array
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError, MissingExtraError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, another_kind, most_unpacked
+from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, most_unpacked
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 USER_BLOCK = 512  #: bytes that MATLAB puts before it
 EXTRA = "hdf5"
-MOST_PARTS = 1000  #: of a struct or cell array that are listed
 MOST_DEPTH = 4  #: structs in structs that are looked into
 OWN = "#"  #: begins the names of groups that MATLAB keeps for itself
 REAL_KINDS = "biuf"

@@ -16,20 +16,19 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
+from halfdof_ctrl.files.formats.text_blocks import BOM, number_rows, whole_numbers
 
 BANNER = b"%%matrixmarket"
-BOM = b"\xef\xbb\xbf"
-PEEK = 256  #: bytes in which the banner begins
+BANNER_PEEK = 256  #: bytes in which the banner begins
 LAYOUTS = ("coordinate", "array")
 FIELDS = {"real": 1, "double": 1, "integer": 1, "unsigned-integer": 1, "complex": 2}  #: numbers of a value
 SYMMETRIES = ("general", "symmetric", "skew-symmetric")
-SIZES = {"coordinate": 3, "array": 2}
+SIZES_OF_LAYOUT = {"coordinate": 3, "array": 2}
 
 
 def is_matrix_market(content: bytes) -> bool:
     """Tell by the banner."""
-    return _begun(content[:PEEK])[: len(BANNER)].lower() == BANNER
+    return _begun(content[:BANNER_PEEK])[: len(BANNER)].lower() == BANNER
 
 
 def _begun(content: bytes) -> bytes:
@@ -61,7 +60,7 @@ def read_matrix_market(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     """
     content = _begun(content)
     layout, field, symmetry = _kind(content)
-    sizes, start, line = _sizes(content, SIZES[layout], most_rows)
+    sizes, start, line = _sizes(content, SIZES_OF_LAYOUT[layout], most_rows)
     rows, columns = sizes[0], sizes[1]
     if layout == "coordinate":
         i, j, values = _coordinate(content[start:], FIELDS[field], sizes[2], line)

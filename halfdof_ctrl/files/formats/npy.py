@@ -30,7 +30,7 @@ MAGIC = b"\x93NUMPY"
 ZIP_HEADER = b"PK\x03\x04"
 LONGEST_HEADER = 10_000  #: characters, as numpy.load allows
 LENGTH_BYTES = {1: 2, 2: 4, 3: 4}  #: of the header's length, by version
-HEADER = re.compile(
+NPY_HEADER = re.compile(
     r"\s*\{\s*'descr'\s*:\s*'(?P<type>[<>|=]?[a-zA-Z]\d*)'\s*,\s*'fortran_order'\s*:\s*(?P<order>True|False)\s*,"
     r"\s*'shape'\s*:\s*\((?P<shape>[\dL,\s]*)\)\s*,?\s*\}\s*"
 )
@@ -149,7 +149,7 @@ def _header(content: bytes, name: str) -> _Header:
     if not width or length > LONGEST_HEADER or len(text) < length:
         msg = f"{name} does not begin as an array of numpy.save. The file is damaged or of another kind."
         raise FileFormatError(msg, path="")
-    match = HEADER.fullmatch(text)
+    match = NPY_HEADER.fullmatch(text)
     if match is None and not RECORDS.match(text):
         msg = f"{name} has a header that is none of numpy.save: {text[:60]!r}. The file is damaged."
         raise FileFormatError(msg, path="")

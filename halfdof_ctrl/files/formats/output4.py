@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import FileFormatError
-from halfdof_ctrl.files.formats.digits import SINGLE, known_to
+from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING, known_to
 from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of_form, meant_by_form
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
@@ -189,7 +189,7 @@ def _binary_matrices(content: bytes, order: str, room: int) -> Iterator[RawMatri
                 _sparse_column(matrix, places, (column, numbers), (data, word, real.itemsize))
         else:
             raise FileFormatError(CUT, path="")
-        rounding = SINGLE if real.itemsize == RECORD_MARK else EPS
+        rounding = SINGLE_ROUNDING if real.itemsize == RECORD_MARK else EPS
         yield matrix.finished(_gathered(content, matrix, places, real), "binary", rounding)
 
 

@@ -18,21 +18,20 @@ from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats import abaqus
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
-from halfdof_ctrl.files.formats.text_blocks import number_rows
+from halfdof_ctrl.files.formats.text_blocks import BOM, number_rows
 
 COMMENTS = (b"#", b"%", b"//", b"!")
-BOM = b"\xef\xbb\xbf"
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
 LIKE_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([EeDdQq][-+]?\d+|[-+]\d{2,3})?")
-NAME = re.compile(rb"[A-Za-z_\"'\x80-\xff]")  #: begins the title of a column
+TITLE_BEGIN = re.compile(rb"[A-Za-z_\"'\x80-\xff]")  #: begins the title of a column
 NO_NAMES = (b"nan", b"inf", b"infinity", b"i", b"j")
 REMARK = re.compile(rb"(#|%|//|!)[^\n]*")
-WHOLE = re.compile(rb"\d+")
+DIGITS_ALONE = re.compile(rb"\d+")
 DECIMAL_COMMA = re.compile(rb"(?<=\d),(?=\d)")
-HEAD = 2**16  #: bytes in which the first line of data must stand
-SYMMETRIC = 1e-9  #: of the largest entry
+TABLE_HEAD = 2**16  #: bytes in which the first line of data must stand
+TABLE_SYMMETRY = 1e-9  #: of the largest entry
 TRIPLET, LABELLED = 3, 5  #: numbers of a line that may be places and a value
-SIZES = 3  #: numbers of a line of sizes
+SIZES_LINE = 3  #: numbers of a line of sizes
 LONG = 64  #: lines above which a table of so few columns is no square matrix
 
 
@@ -50,7 +49,7 @@ class _Layout:
 
 def is_table(content: bytes) -> bool:
     """Return whether the first line that is no comment, or the one after a line of titles, is made of numbers."""
-    if b"\0" in content[:HEAD]:
+    if b"\0" in content[:TABLE_HEAD]:
         return False
     lines = [fields for _, fields in _first_lines(content.removeprefix(BOM))][:2]
     return any(
@@ -87,7 +86,7 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
     layout = _layout(content)
     plain = _plain(content, layout)
     bare = not (dense or layout.labelled or layout.titles)
-    if bare and plain.count(b"\n", 0, HEAD) > LONG and layout.columns in {TRIPLET, LABELLED}:
+    if bare and plain.count(b"\n", 0, TABLE_HEAD) > LONG and layout.columns in {TRIPLET, LABELLED}:
         return _long_by_place(plain, layout.columns, most_rows)
     table, names = _numbers(plain, layout)
     if bare and table.shape[1] in {TRIPLET, LABELLED}:
@@ -99,7 +98,7 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
 
 def _first_lines(content: bytes) -> list[tuple[int, bytes]]:
     """Return the first lines that are neither empty nor comments, with their numbers."""
-    lines = enumerate(content[:HEAD].split(b"\n"))
+    lines = enumerate(content[:TABLE_HEAD].split(b"\n"))
     return [
         (number, line.rstrip(b"\r"))
         for number, line in lines
@@ -134,9 +133,9 @@ def _layout(content: bytes) -> _Layout:
     first = _cut(rows[0], separator, decimal_comma)
     second = _cut(rows[1], separator, decimal_comma) if len(rows) > 1 else first
     others = [field for field in first if LIKE_NUMBER.fullmatch(field) is None]
-    counted = others == [b""] and not first[0] and all(WHOLE.fullmatch(field) for field in first[1:])
-    words = any(others) and all(NAME.match(field) and field.lower() not in NO_NAMES for field in others if field)
-    has_titles = counted or (words and all(WHOLE.fullmatch(field) for field in first if field not in others))
+    counted = others == [b""] and not first[0] and all(DIGITS_ALONE.fullmatch(field) for field in first[1:])
+    words = any(others) and all(TITLE_BEGIN.match(field) and field.lower() not in NO_NAMES for field in others if field)
+    has_titles = counted or (words and all(DIGITS_ALONE.fullmatch(field) for field in first if field not in others))
     names_rows = second[:1] != [b""] and LIKE_NUMBER.fullmatch(second[0]) is None if second else False
     labelled = names_rows or (has_titles and not first[0])
     titles = tuple([field.decode("utf-8", "replace") for field in first]) if has_titles else ()
@@ -185,7 +184,7 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
         return abaqus.read_abaqus(plain, most_rows)
     twice = len(np.unique(places, axis=0)) < rows
     sparse = None if twice or places.max() > most_rows else _readable_by_place(plain, most_rows)
-    is_symmetric = _asymmetry(table) <= SYMMETRIC * float(np.abs(table).max(initial=0.0))
+    is_symmetric = _asymmetry(table) <= TABLE_SYMMETRY * float(np.abs(table).max(initial=0.0))
     if sparse is None or (is_symmetric and np.count_nonzero(sparse.matrix.diagonal()) < sparse.matrix.shape[0]):
         return None
     covers = np.count_nonzero(sparse.matrix.diagonal()) == sparse.matrix.shape[0]
@@ -215,7 +214,7 @@ def _long_by_place(plain: bytes, columns: int, most_rows: int) -> RawMatrix:
     if (head[:, :-1] != np.rint(head[:, :-1])).any():
         return _refuse_places(head)
     first = head[0]
-    if columns == SIZES and first[0] == first[1] and first[2] == _count_rows(plain) - 1:
+    if columns == SIZES_LINE and first[0] == first[1] and first[2] == _count_rows(plain) - 1:
         raise _size_line_error(first, int(first[2]))
     return abaqus.read_abaqus(plain, most_rows)
 
@@ -239,7 +238,7 @@ def _refuse_places(table: FloatArray) -> RawMatrix:
 
 def _is_size_line(table: FloatArray) -> bool:
     rows, columns = table.shape
-    if columns != SIZES or rows < SIZES - 1 or table[0, 0] != table[0, 1] or table[0, 2] != rows - 1:
+    if columns != SIZES_LINE or rows < SIZES_LINE - 1 or table[0, 0] != table[0, 1] or table[0, 2] != rows - 1:
         return False
     return bool(table[1:, :2].max() <= table[0, 0])
 
@@ -263,8 +262,8 @@ def _written_as_places(plain: bytes, columns: int) -> bool:
     lines = [_cut(line, *_separators(line)) for _, line in _first_lines(plain)]
     return all(
         len(fields) == columns
-        and all(WHOLE.fullmatch(field) for field in fields[:-1])
-        and not WHOLE.fullmatch(fields[-1])
+        and all(DIGITS_ALONE.fullmatch(field) for field in fields[:-1])
+        and not DIGITS_ALONE.fullmatch(fields[-1])
         and b"." in fields[-1]
         for fields in lines
     )
@@ -276,7 +275,7 @@ def _dense(table: FloatArray, names: tuple[str, ...] | None, layout: _Layout, ro
     if not table.size:
         msg = "no rows of numbers in it. The file is empty, or cut short."
         raise FileFormatError(msg, path="")
-    if not layout.titles and rows == columns + 1 and rows > SIZES and _counts(table[0]):
+    if not layout.titles and rows == columns + 1 and rows > SIZES_LINE and _counts(table[0]):
         table, rows = table[1:], columns
         notes = (*notes, "its first line counts the columns and is left out")
     if layout.titles and not layout.labelled:

@@ -14,6 +14,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 
+BOM = b"\xef\xbb\xbf"  #: begins text that Windows wrote as UTF-8
 LONGEST_LINE = 1024  #: characters of a line of fixed fields; Fortran's own limit is 132
 TEXT_BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
@@ -23,7 +24,7 @@ FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
 WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
 TOO_LONG = "a line has more than its fields"
 TOO_SHORT = "lines are far shorter than their fields"
-SPREAD = 10  #: times that lines may grow when blanks at their ends are filled in,
+MOST_GROWTH = 10  #: times that lines may grow when blanks at their ends are filled in,
 FREE_SPREAD = 2**20  #: beyond so many bytes
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
@@ -146,7 +147,7 @@ def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Seque
     full = width * per_line
     if any(len(line) > full and line[full:].strip() for line in lines):
         raise ValueError(TOO_LONG)
-    if full * len(lines) > FREE_SPREAD + SPREAD * sum(map(len, lines)):
+    if full * len(lines) > FREE_SPREAD + MOST_GROWTH * sum(map(len, lines)):
         raise ValueError(TOO_SHORT)
     text = b"".join([line[:full].ljust(full) for line in lines]).translate(AS_PYTHON)
     fields = np.frombuffer(text, dtype=f"S{width}").reshape(len(lines), per_line)

@@ -13,6 +13,7 @@ from halfdof_ctrl.base.errors import FileFormatError
 Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
 Kind: TypeAlias = Literal["matrix", "text", "struct", "cell", "object"]
 
+MOST_PARTS = 1000  #: of a struct or cell array that are listed
 EXPANSION = 10  #: bytes that are unpacked of a packed byte
 FREE_BYTES = 2**26  #: that may be unpacked whatever the file's length: 2800 x 2800 numbers, mostly zeros
 PLANE = 2  #: dimensions of a matrix

@@ -16,9 +16,9 @@ from scipy.linalg.lapack import dpotrf
 from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
 from halfdof_ctrl.base.matrix_residual import exact_residual
 
-CORRECTED = 1e-8  #: a correction of this size leaves errors of its square, which is below rounding
+CORRECTED_FACTOR = 1e-8  #: a correction of this size leaves errors of its square, which is below rounding
 MOST_CORRECTIONS = 3  #: one does, but for matrices that are singular to twelve digits
-DIVERGED = 0.5  #: a correction of this size does not come from rounding: the factor is of no use
+DIVERGED_FACTOR = 0.5  #: a correction of this size does not come from rounding: the factor is of no use
 
 
 def corrected_factor(K: FloatArray) -> FloatArray | None:
@@ -42,6 +42,8 @@ def corrected_factor(K: FloatArray) -> FloatArray | None:
     diagonal = np.diagonal(K)
     if not (diagonal > 0.0).all():
         return None
+    if np.count_nonzero(K) == len(K):
+        return np.diag(np.sqrt(diagonal))
     scale = powers_of_two(np.sqrt(diagonal))
     scaled = scale[:, None] * K * scale
     U, failed = dpotrf(scaled, lower=0, clean=1)
@@ -51,10 +53,10 @@ def corrected_factor(K: FloatArray) -> FloatArray | None:
     for _ in range(MOST_CORRECTIONS):
         G = _congruent(U, exact_residual(scaled, U.T, U))
         size = float(np.abs(G).max(initial=0.0))
-        if not size < DIVERGED:
+        if not size < DIVERGED_FACTOR:
             return None
         U = U + np.where(inside, (np.triu(G, 1) + np.diag(np.diagonal(G) / 2.0)) @ U, 0.0)
-        if size <= CORRECTED:
+        if size <= CORRECTED_FACTOR:
             break
     return np.asarray(U / scale)
 

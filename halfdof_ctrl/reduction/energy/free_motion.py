@@ -21,7 +21,7 @@ from halfdof_ctrl.reduction.energy.cholesky import solved
 from halfdof_ctrl.reduction.energy.rigid import StiffnessFactor
 
 MASSLESS = 64.0  #: times n eps of the terms: a smaller momentum of a free motion is rounding
-BALANCED = 4 * EPS  #: of the terms: forces of dampers that cancel to this part are rounding of their entries
+BALANCED_FORCES = 4 * EPS  #: of the terms: forces of dampers that cancel to this part are rounding of their entries
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -120,7 +120,7 @@ def _balanced(C: FloatArray, motions: FloatArray) -> FloatArray:
     """Return ``C Phi`` with exact zeros where its terms cancel to rounding of the entries of C."""
     forces = exact_product(C, motions)
     terms = np.abs(C) @ np.abs(motions)
-    return np.where(np.abs(forces) <= BALANCED * terms, 0.0, forces)
+    return np.where(np.abs(forces) <= BALANCED_FORCES * terms, 0.0, forces)
 
 
 def _none(size: int, n_i: int) -> FreeMotions:

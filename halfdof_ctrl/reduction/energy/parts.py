@@ -20,7 +20,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 SAME = 4 * EPS  #: entries above and below the diagonal that differ by this part of the larger one differ by rounding
 TURNED = 16 * EPS  #: the same for this part of their diagonal entries: rounding of T^T K T with elements at an angle
-SINGULAR = 16.0  #: times n eps: a smaller reciprocal condition number of C_cc is rounding
+SINGULAR_DAMPING = 16.0  #: times n eps: a smaller reciprocal condition number of C_cc is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -96,7 +96,7 @@ class HalfDamping:
         with np.errstate(divide="ignore", invalid="ignore"):
             factors, pivots, failed = scipy.linalg.lapack.dgetrf(self.matrix)
         rcond = 0.0 if failed else float(dgecon(factors, float(np.linalg.norm(self.matrix, 1)))[0])
-        if rcond <= SINGULAR * len(C) * EPS:
+        if rcond <= SINGULAR_DAMPING * len(C) * EPS:
             msg = (
                 "There are no energy coordinates in terms of DOFs: the damping among the DOFs without mass "
                 f"({listed(names)}) is singular, rcond {rcond:.1e}, as with a damper between two of them, so that a "

@@ -18,8 +18,10 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form
 
-ROUNDING = 4 * EPS  #: times n: eigenvalues of C at unit diagonal, or of R relative to its largest, that are no fault
-SHARE = 0.1  #: of the largest power that enters: DOFs with less are not named
+PASSIVE_WITHIN = (
+    4 * EPS
+)  #: times n: eigenvalues of C at unit diagonal, or of R relative to its largest, that are no fault
+ENTERING_SHARE = 0.1  #: of the largest power that enters: DOFs with less are not named
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -78,11 +80,11 @@ def port_hamiltonian(model: SecondOrderModel) -> PortHamiltonian:
     form = energy_form(model)
     exchanged, lost = _split(form)
     smallest = _smallest_at_unit_diagonal(np.asarray(form.model.C, dtype=float))
-    is_passive = smallest >= -ROUNDING * len(form.model.dofs)
+    is_passive = smallest >= -PASSIVE_WITHIN * len(form.model.dofs)
     dofs: tuple[str, ...] = ()
     if not is_passive:
         values, vectors = np.linalg.eigh(lost)
-        is_passive = bool(values[0] >= -ROUNDING * len(lost) * np.abs(values).max())
+        is_passive = bool(values[0] >= -PASSIVE_WITHIN * len(lost) * np.abs(values).max())
         dofs = () if is_passive else _entrances(form, vectors[:, 0])
     return PortHamiltonian(
         J=read_only(exchanged),
@@ -124,5 +126,5 @@ def _entrances(form: EnergyForm, x: FloatArray) -> tuple[str, ...]:
     velocity = form.velocity.X @ x
     power = -velocity * ((form.model.C + form.model.C.T) / 2.0 @ velocity)
     strongest = float(power.max())
-    order = [j for j in np.argsort(-power, kind="stable").tolist() if power[j] >= SHARE * strongest]
+    order = [j for j in np.argsort(-power, kind="stable").tolist() if power[j] >= ENTERING_SHARE * strongest]
     return tuple([form.model.dofs[j] for j in order])

@@ -24,10 +24,10 @@ from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
-SUSPICIOUS = 128.0  #: times n eps of the diagonal: a smaller pivot may stand for a motion that is free, or nearly
-NEXT = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
+SMALL_PIVOT = 128.0  #: times n eps of the diagonal: a smaller pivot may stand for a motion that is free, or nearly
+NEXT_MODE_RATIO = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
 NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
-FORWARD = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
+FIRST_PREFERRED = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
 INVERSE_ITERATIONS = 8
 REFINEMENTS = 2
 
@@ -78,14 +78,14 @@ def stiffness_factor(K: FloatArray, first: int, names: tuple[str, ...]) -> Stiff
     scale = np.where(positive, powers_of_two(np.sqrt(np.abs(np.diagonal(K)))), 1.0)
     scaled = scale[:, None] * K * scale
     U = corrected_factor(scaled)
-    if U is not None and (np.diagonal(U) ** 2 > SUSPICIOUS * n * EPS * np.diagonal(scaled)).all():
+    if U is not None and (np.diagonal(U) ** 2 > SMALL_PIVOT * n * EPS * np.diagonal(scaled)).all():
         return _whole(U, scale)
     candidates = _candidates(scaled, first, names)
     motions = _null_vectors(scaled, candidates, names)
     free, rest = _free_motions(scaled, motions, names)
     nearest = min(rest, _next_ratio(scaled, candidates, motions) if free.shape[1] == candidates.size else np.inf)
     largest = _ratios(scaled, free).max(initial=0.0)
-    if free.shape[1] == 0 or nearest <= NEXT * largest or nearest <= 1.0:
+    if free.shape[1] == 0 or nearest <= NEXT_MODE_RATIO * largest or nearest <= 1.0:
         if U is None:
             raise _undecided(nearest, names, candidates)
         return _whole(U, scale, nearest)
@@ -155,13 +155,13 @@ def _pivots(K: FloatArray, first: int, names: tuple[str, ...]) -> tuple[IndexArr
     schur = np.array(K[first:, first:])
     if first:
         U, failed = dpotrf(K[:first, :first], lower=0, clean=1)
-        small = np.diagonal(U) ** 2 <= SUSPICIOUS * n * EPS * np.diagonal(K)[:first]
+        small = np.diagonal(U) ** 2 <= SMALL_PIVOT * n * EPS * np.diagonal(K)[:first]
         if failed or small.any():
             raise _floating_error(names[failed - 1 if failed else int(np.argmax(small))])
         half = solved(U, K[:first, first:], transposed=True)
         schur -= half.T @ half
-    none = bool(np.diagonal(schur).max(initial=0.0) <= SUSPICIOUS * n * EPS)  # dpstrf asks it of later pivots only
-    _, order, rank, _ = dpstrf(schur, tol=SUSPICIOUS * n * EPS)
+    none = bool(np.diagonal(schur).max(initial=0.0) <= SMALL_PIVOT * n * EPS)  # dpstrf asks it of later pivots only
+    _, order, rank, _ = dpstrf(schur, tol=SMALL_PIVOT * n * EPS)
     places = first + (np.arange(n - first) if none else order - 1)
     return places.astype(np.intp), 0 if none else int(rank)
 
@@ -247,6 +247,6 @@ def _supports(free: FloatArray, first: int) -> IndexArray:
     """Choose the DOFs that show the free motions best; of equal ones those that come first."""
     n, d = free.shape
     shown = np.linalg.qr(free)[0]
-    preference = 1.0 + FORWARD * np.linspace(1.0, 0.0, n)
+    preference = 1.0 + FIRST_PREFERRED * np.linspace(1.0, 0.0, n)
     _, _, order = scipy.linalg.qr((shown * preference[:, None])[first:].T, mode="economic", pivoting=True)
     return np.sort(first + np.asarray(order[:d])).astype(np.intp)

@@ -17,16 +17,16 @@ DOF = b"5.1\n5.3\n60.2\n"
 EXPORT = Path(__file__).parents[4] / "shared" / "exports" / "calculix"
 
 
-@pytest.mark.parametrize("given", ["job.sti", "job.mas", "."])
+@pytest.mark.parametrize("given", ["job.sti", "job.mas", "job.dof", "."])
 def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
-    """From either matrix, or the folder; rows without an entry at the end are there."""
+    """From any of them, or the folder; rows without an entry at the end are there."""
     for name, content in (("job.sti", STI), ("job.mas", MAS), ("job.dof", DOF), ("other.sti.bak", b"")):
         (tmp_path / name).write_bytes(content)
     with pytest.warns(ImportedModelWarning, match="no damping C"):
         model = load_model(tmp_path / given)
     assert model.dofs == ("n5_u1", "n5_u3", "n60_u2")
-    np.testing.assert_array_equal(model.K.toarray(), K)  # type: ignore[union-attr]
-    np.testing.assert_array_equal(model.M.toarray(), np.diag([1.0, 1.0, 0.0]))  # type: ignore[union-attr]
+    np.testing.assert_array_equal(model.K.toarray(), K)
+    np.testing.assert_array_equal(model.M.toarray(), np.diag([1.0, 1.0, 0.0]))
 
 
 @pytest.mark.skipif(not EXPORT.exists(), reason="no exported files here")
@@ -34,7 +34,7 @@ def test_a_beam_has_the_frequencies_that_calculix_found() -> None:
     """105.425, 665.943, 1891.57 Hz, each twice; six digits are known."""
     with pytest.warns(ImportedModelWarning, match="no damping C"):
         model = load_model(EXPORT / "beam.sti")
-    inverse = scipy.linalg.eigh(model.M.toarray(), model.K.toarray(), eigvals_only=True)[::-1][:6]  # type: ignore[union-attr]
+    inverse = scipy.linalg.eigh(model.M.toarray(), model.K.toarray(), eigvals_only=True)[::-1][:6]
     expected = np.repeat([105.425, 665.943, 1891.57], 2)
     np.testing.assert_allclose(np.sqrt(1.0 / inverse) / (2.0 * np.pi), expected, rtol=3e-6)
     assert model.known_to == 5e-14
