@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, read_only
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
@@ -22,7 +22,8 @@ from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.finite_part import CLEAR_MARGIN, GENERIC_POINTS, finite_part, infinite_part
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS, finite_part, infinite_part
+from halfdof_ctrl.descriptor.found_structure import found_structure, order_by_size
 from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
 from halfdof_ctrl.model.refusals import singular_pencil_error
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
@@ -33,13 +34,19 @@ from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
 class PencilStructure:
     """Eigenvalues of ``P(s)`` for n DOFs, found without the reduction."""
 
-    finite_eigenvalues: ComplexArray  #: by QZ [rad/s], sorted by size; those at the origin are exactly zero
+    finite_eigenvalues: ComplexArray  #: [rad/s], sorted by size; those at the origin are exactly zero
+    bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
+    most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
-    is_regular: bool  #: whether det P(s) is not identically zero
-    gap: float  #: smallest ratio of a pivot that counts to one that does not, in all rank decisions
-    is_certain: bool  #: False if a rank decision was so close to rounding that a count may be wrong
+    is_regular: bool  #: whether det P(s) is not identically zero, exactly
+    uncertainty: tuple[str, ...]  #: what is uncertain, a sentence each
     model: SecondOrderModel = field(repr=False)  #: whose structure this is
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether nothing is uncertain: the stored numbers say all of this exactly, and rounding left no part of it."""
+        return not self.uncertainty
 
     @property
     def index(self) -> int:
@@ -52,6 +59,15 @@ class PencilStructure:
         return self.is_regular and not self.improper_pairs
 
     @cached_property  # which is why this class has no slots
+    def gap(self) -> float:
+        """Smallest ratio of a pivot that counts to one that does not where ranks are decided by their size.
+
+        The counts do not rest on it, which are exact.
+        """
+        pencil = first_order_pencil((self.model.K, self.model.C, self.model.M))
+        return infinite_part(pencil.A, pencil.E).evidence.gap
+
+    @cached_property
     def improper_pairs(self) -> tuple[tuple[str, str, int], ...]:
         """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for."""
         if not self.is_regular:
@@ -101,18 +117,16 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     (('F_q2', 'q2', 2),)
     """
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
-    pencil = first_order_pencil((model.K, model.C, model.M))
-    finite, infinite = finite_part(pencil.A, pencil.E), infinite_part(pencil.A, pencil.E)
-    eigenvalues = _sorted(finite.eigenvalues * pencil.scale)
-    adds_up = eigenvalues.size + sum(infinite.blocks) == len(pencil.E)
-    is_clear = infinite.evidence.margin > CLEAR_MARGIN
+    found = found_structure((model.K, model.C, model.M))
+    order = order_by_size(found.values)
     return PencilStructure(
-        finite_eigenvalues=eigenvalues,
-        n_infinite=2 * len(model.dofs) - eigenvalues.size,
-        infinite_blocks=infinite.blocks,
-        is_regular=finite.is_regular,
-        gap=infinite.evidence.gap,
-        is_certain=finite.is_certain and (not finite.is_regular or (adds_up and is_clear)),
+        finite_eigenvalues=read_only(found.values[order]),
+        bounds=read_only(found.bounds[order]),
+        most_finite=found.most,
+        n_infinite=2 * len(model.dofs) - found.values.size,
+        infinite_blocks=found.blocks,
+        is_regular=found.is_regular,
+        uncertainty=found.doubts,
         model=model,
     )
 
@@ -231,9 +245,7 @@ def typical_frequency(model: SecondOrderModel) -> float:
 
 def _sorted(values: ComplexArray) -> ComplexArray:
     """Sort by size, conjugate pairs with the positive imaginary part first."""
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return values[np.lexsort((-values.imag, size))]
+    return values[order_by_size(values)]
 
 
 def _is_singular(P: Matrix) -> bool:

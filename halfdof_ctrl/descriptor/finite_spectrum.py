@@ -1,0 +1,218 @@
+"""All finite eigenvalues of a regular matrix polynomial, how many there are, and what of it is in doubt.
+
+Three things are found apart from each other and must agree: the exact count of the stored numbers (`exact_counts`), the
+eigenvalues that quotients with QZ vectors make sharp (`quotients`), and where these are fewer, the count by circles
+(`contours`). The list that comes out is proved in the end: ``sum 1 / (s - s_i) = tr P(s)^-1 P'(s)`` at a few s, where one
+that is missing, doubled or invented shows as a number of order one.
+
+Stored numbers that were rounded may have eigenvalues that nobody meant, of the size of the parts that rounding left:
+zeros of a free body become small numbers, infinite eigenvalues large ones. So the count is an interval from what is
+told from rounding to what the doubles say exactly.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.descriptor.contours import contour
+from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
+from halfdof_ctrl.descriptor.groups import Listed, separated
+from halfdof_ctrl.descriptor.patterns import diagonal_blocks
+from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
+from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
+
+OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
+CHECKS = 5  #: points at which the list is proved
+SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
+SEED = 7  #: of the directions of these points
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FiniteSpectrum:
+    """Finite eigenvalues with bounds."""
+
+    values: ComplexArray  #: (k,) [rad/s]; those at the origin are exactly zero
+    bounds: FloatArray  #: (k,) of the error of each [rad/s]
+    most: int  #: what the stored numbers say exactly; k where nothing is in doubt
+    doubts: tuple[str, ...]  #: what is uncertain, in words
+
+
+@dataclass(slots=True)
+class _Findings:
+    """What a block has, as it is collected, in its own unit."""
+
+    listed: Listed
+    zeros: int = 0
+    radius: float = 0.0  #: zeros are known to this
+    doubts: list[str] = field(default_factory=list)
+
+
+def finite_spectrum(coefficients: Sequence[Matrix], counts: ExactCounts) -> FiniteSpectrum:
+    """Find the finite eigenvalues of a regular matrix polynomial.
+
+    Parameters
+    ----------
+    coefficients : sequence of (n, n) ndarrays
+        Of 1, s, s^2.
+    counts : ExactCounts
+        Of the same.
+    """
+    blocks = diagonal_blocks(np.any([part != 0.0 for part in coefficients], axis=0))
+    values, bounds, doubts = [np.zeros(0, dtype=np.complex128)], [np.zeros(0)], []
+    for rows, columns in blocks:
+        parts = [part[np.ix_(rows, columns)] for part in coefficients]
+        of_block = counts if len(blocks) == 1 else exact_counts(parts)
+        polynomial = ScaledPolynomial.of(parts)
+        found = _of_block(polynomial, of_block)
+        zeros = np.zeros(found.zeros)
+        values += [zeros.astype(np.complex128), found.listed.values * polynomial.unit]
+        bounds += [_zero_bounds(found, of_block.at_origin) * polynomial.unit, found.listed.bounds * polynomial.unit]
+        doubts += found.doubts
+    return FiniteSpectrum(
+        values=np.concatenate(values), bounds=np.concatenate(bounds), most=counts.degree, doubts=tuple(doubts)
+    )
+
+
+def _zero_bounds(found: _Findings, exact: int) -> FloatArray:
+    """Give exact zeros no bound, the others the radius within which they are."""
+    return np.where(np.arange(found.zeros) < exact, 0.0, found.radius)
+
+
+def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
+    if counts.degree == counts.at_origin:
+        return _Findings(Listed.none(), zeros=counts.degree)
+    estimates = eigenvalue_estimates(polynomial)
+    near = _near_zero(estimates, counts.at_origin, is_real=polynomial.is_real)
+    known = estimates.is_known & ~near
+    weights = _weights(polynomial, estimates)
+    found = _Findings(Listed.none(), zeros=counts.at_origin)
+    if int(weights[near].sum()) > counts.at_origin:
+        _count_zeros(polynomial, estimates, near, counts, found)
+    missing = counts.degree - found.zeros
+    if int(weights[known].sum()) != missing:
+        known = _within_gap(polynomial, estimates, near, weights, counts.degree)
+        if known is None:
+            known = estimates.is_known & ~near
+    others = estimates.values[~known & ~near]
+    found.listed = separated(polynomial, estimates, known, others, has_zeros=found.zeros > 0)
+    _judge(polynomial, found, counts)
+    return found
+
+
+def _weights(polynomial: ScaledPolynomial, estimates: Estimates) -> npt.NDArray[np.int64]:
+    """Count conjugates, which are left out of real polynomials."""
+    return np.where((estimates.values.imag != 0.0) & polynomial.is_real, 2, 1)
+
+
+def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArray[np.bool_]:
+    """Tell which estimates stand for eigenvalues at the origin: the smallest, and those within their bounds of it."""
+    near = (np.abs(estimates.values) <= estimates.bounds) & (estimates.bounds <= 1.0)
+    last = np.flatnonzero(near & np.isfinite(estimates.bounds))
+    near = np.arange(near.size) <= (last[-1] if last.size and exact else -1) if exact else near
+    total = 0
+    for k, value in enumerate(estimates.values):
+        if total >= exact:
+            break
+        near[k] = True
+        total += 2 if is_real and value.imag != 0.0 else 1
+    return np.asarray(near)
+
+
+def _count_zeros(
+    polynomial: ScaledPolynomial,
+    estimates: Estimates,
+    near: npt.NDArray[np.bool_],
+    counts: ExactCounts,
+    found: _Findings,
+) -> None:
+    """Count what is not told from zero by a circle between it and the rest."""
+    inner = float(np.abs(estimates.values[near]).max(initial=0.0))
+    outer = float(np.abs(estimates.values[~near]).min(initial=np.inf))
+    radius = np.sqrt(inner * outer) if np.isfinite(outer) else OUTSIDE * inner
+    count = contour(polynomial, 0.0, radius).count
+    found.zeros = int(count) if count is not None else int(_weights(polynomial, estimates)[near].sum())
+    found.zeros = max(found.zeros, counts.at_origin)
+    found.radius = float(np.maximum(np.abs(estimates.values[near]), estimates.radii[near]).max(initial=0.0))
+    more = found.zeros - counts.at_origin
+    if more > 0:
+        found.doubts.append(
+            f"{more} of {counts.degree} eigenvalues are within {found.radius * polynomial.unit:.2g} rad/s of the origin "
+            "and not told from zero by numbers that are known to their last digit: free bodies in rounded numbers have "
+            "such eigenvalues instead of zeros"
+        )
+
+
+def _within_gap(
+    polynomial: ScaledPolynomial,
+    estimates: Estimates,
+    near: npt.NDArray[np.bool_],
+    weights: npt.NDArray[np.int64],
+    degree: int,
+) -> npt.NDArray[np.bool_] | None:
+    """Take the estimates within the circle that holds as many eigenvalues as the exact count; None without one.
+
+    Multiple eigenvalues are among them, whose estimates are too uncertain to be known one by one.
+    """
+    size = np.abs(estimates.values)
+    total = np.cumsum(weights)
+    place = np.flatnonzero(total == degree)
+    if not place.size or not np.isfinite(size[place[0]]):
+        return None
+    inner = size[place[0]]
+    outer = size[place[0] + 1] if place[0] + 1 < size.size else np.inf
+    radius = np.sqrt(inner * outer) if np.isfinite(outer) else OUTSIDE * inner
+    if not 0.0 < radius < np.inf or contour(polynomial, 0.0, radius).count != degree:
+        return None
+    return np.asarray((np.arange(size.size) <= place[0]) & ~near)
+
+
+def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) -> None:
+    """Compare the number of what was found with the exact one, and prove the list."""
+    total = found.zeros + found.listed.values.size
+    largest = float(np.abs(found.listed.values).max(initial=0.0))
+    if total != counts.degree:
+        within = contour(polynomial, 0.0, OUTSIDE * largest).count if largest > 0.0 else None
+        told = f"{total} eigenvalues are told from rounding, up to {largest * polynomial.unit:.3g} rad/s"
+        if within == total:
+            found.doubts.append(
+                f"{told}, and a circle around them holds as many, but the stored numbers have {counts.degree}: "
+                f"{counts.degree - total} of them are so large that parts of the size of rounding make them, which an "
+                "exact model would have at infinity"
+            )
+        else:
+            around = "no whole number" if within is None else f"{within}"
+            found.doubts.append(f"{told}; a circle around them holds {around}, the stored numbers have {counts.degree}")
+    found.doubts += found.listed.doubts
+    if total and not _is_proved(polynomial, found, largest):
+        found.doubts.append(
+            f"the list of {total} eigenvalues does not reproduce the logarithmic derivative of det P(s): some are missing, "
+            "doubled or invented"
+        )
+
+
+def _is_proved(polynomial: ScaledPolynomial, found: _Findings, largest: float) -> bool:
+    """Compare ``sum s / (s - s_i)`` with ``s tr P(s)^-1 P'(s)`` at points that spread over the eigenvalues."""
+    values = found.listed.values
+    size = np.sort(np.abs(values)) if values.size else np.array([1.0])
+    low = max(float(size[0]), 4.0 * found.radius)
+    radii = np.unique(
+        np.concatenate([np.quantile(size, np.linspace(0.1, 0.9, CHECKS - 2)), [low / 2.0, 2.0 * max(largest, low)]])
+    )
+    angles = np.random.default_rng(SEED).uniform(0.2, 1.3, radii.size)  # off the axes
+    points = np.asarray(radii * np.exp(1j * angles) * (1.0 + 0.01 * angles))
+    with np.errstate(all="ignore"):
+        right = points * polynomial.logarithmic_derivative(points)
+        left = found.zeros + (points[:, None] / (points[:, None] - values)).sum(axis=1)
+        difference = np.abs(left - right)
+        room = SAME * max(1.0, np.sqrt(values.size + found.zeros)) + _slack(points, found)
+    return bool((np.isfinite(difference) & (difference <= room)).all())
+
+
+def _slack(points: ComplexArray, found: _Findings) -> FloatArray:
+    """Bound what errors of the eigenvalues within their bounds change in the sums."""
+    distance = np.abs(points[:, None] - found.listed.values)
+    share = np.abs(points)[:, None] * found.listed.bounds / np.maximum(distance, np.finfo(float).tiny) ** 2
+    return np.asarray(np.minimum(share, 1.0).sum(axis=1) + found.zeros * np.minimum(found.radius / np.abs(points), 0.5))

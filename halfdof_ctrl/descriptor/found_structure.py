@@ -1,0 +1,99 @@
+"""Finite and infinite structure of ``K + C s + M s^2``: exact counts first, then eigenvalues, then what is in doubt."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
+from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
+from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
+from halfdof_ctrl.descriptor.first_order import first_order_pencil
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FoundStructure:
+    """What is known of a square matrix polynomial."""
+
+    values: ComplexArray  #: (k,) finite eigenvalues [rad/s]
+    bounds: FloatArray  #: (k,) of the error of each [rad/s]
+    most: int  #: finite eigenvalues of the stored numbers, exactly
+    blocks: tuple[int, ...]  #: sizes of the blocks at infinity of the pencil (8), the largest first
+    is_regular: bool
+    doubts: tuple[str, ...]
+
+
+def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
+    """Find counts, eigenvalues and doubts of a square matrix polynomial, of 1, s, s^2."""
+    if not coefficients[0].size:
+        empty = np.zeros(0)
+        return FoundStructure(
+            values=empty.astype(np.complex128), bounds=empty, most=0, blocks=(), is_regular=True, doubts=()
+        )
+    counts = exact_counts(coefficients)
+    if not counts.is_regular:
+        return _of_singular(coefficients)
+    share = share_of_rounding(coefficients)
+    spectrum = finite_spectrum(coefficients, counts)
+    doubts = list(spectrum.doubts)
+    if share > UNDECIDED:
+        doubts.append(nearly_singular(share))
+    blocks = counts.blocks
+    if spectrum.values.size != counts.degree:
+        blocks, doubt = _meant_blocks(coefficients, counts, spectrum.values.size)
+        doubts.append(doubt)
+    return FoundStructure(
+        values=spectrum.values,
+        bounds=spectrum.bounds,
+        most=counts.degree,
+        blocks=blocks,
+        is_regular=True,
+        doubts=tuple(doubts),
+    )
+
+
+def nearly_singular(share: float) -> str:
+    """Say that a model is regular by no more than rounding."""
+    return (
+        f"the stored numbers are regular, but changes of {np.finfo(float).eps / share:.1e} of each entry can make det P(s) "
+        f"vanish identically, and rounding is {np.finfo(float).eps:.1e}"
+    )
+
+
+def order_by_size(values: ComplexArray) -> npt.NDArray[np.intp]:
+    """Return the order by size, conjugate pairs with the positive imaginary part first."""
+    with np.errstate(divide="ignore"):
+        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
+    return np.lexsort((-values.imag, size))
+
+
+def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:
+    """Find the eigenvalues of the regular part by deflation, whose ranks are decided by size."""
+    pencil = first_order_pencil(coefficients)
+    part = finite_part(pencil.A, pencil.E)
+    doubt = "the number of eigenvalues of the regular part: a rank on which it rests is hardly to be told from rounding"
+    values = part.eigenvalues * pencil.scale
+    return FoundStructure(
+        values=values,
+        bounds=np.full(values.size, np.inf),
+        most=values.size,
+        blocks=infinite_part(pencil.A, pencil.E).blocks,
+        is_regular=False,
+        doubts=() if part.is_certain else (doubt,),
+    )
+
+
+def _meant_blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], str]:
+    """Return the blocks at infinity that go with the smaller count, by ranks up to rounding, and how sure they are."""
+    pencil = first_order_pencil(coefficients)
+    blocks = infinite_part(pencil.A, pencil.E).blocks
+    if sum(blocks) + finite == len(pencil.E):
+        index, exact = max(blocks, default=0), max(counts.blocks, default=0)
+        return blocks, f"the index is {index} by ranks up to rounding and {exact} of the stored numbers"
+    return counts.blocks, (
+        f"the blocks at infinity are those of the stored numbers, which have {counts.degree} finite eigenvalues; ranks "
+        "up to rounding give no blocks that go with fewer"
+    )
