@@ -21,10 +21,20 @@ from halfdof_ctrl.descriptor.contours import contour
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.groups import Listed, separated
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
+from halfdof_ctrl.descriptor.quotients import KNOWN, Estimates, eigenvalue_estimates
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
 OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
+TINY = 1e-3  #: in the unit of a polynomial: estimates below may stand for zeros where nothing else is known
+FAINT = 1e-4  #: relative bound above which an eigenvalue far above all others stands for an infinite one
+FAR_ABOVE = 100.0  #: ratio to the next smaller one
+PLACES = (
+    0.5,
+    0.75,
+    0.25,
+    0.9,
+)  #: between the inner and the outer eigenvalues, in the logarithm, where circles are tried
+AROUND = 0.3  #: of the largest: eigenvalues around zero have a smaller mean
 CHECKS = 5  #: points at which the list is proved
 SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
 SEED = 7  #: of the directions of these points
@@ -86,20 +96,39 @@ def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
         return _Findings(Listed.none(), zeros=counts.degree)
     estimates = eigenvalue_estimates(polynomial)
     near = _near_zero(estimates, counts.at_origin, is_real=polynomial.is_real)
-    known = estimates.is_known & ~near
+    known = _is_told(estimates) & ~near
     weights = _weights(polynomial, estimates)
     found = _Findings(Listed.none(), zeros=counts.at_origin)
     if int(weights[near].sum()) > counts.at_origin:
-        _count_zeros(polynomial, estimates, near, counts, found)
+        found.zeros, found.radius = _count_zeros(polynomial, estimates, near, counts.at_origin)
+        if found.zeros == counts.at_origin:
+            near &= _first(weights, counts.at_origin)
+            known = _is_told(estimates) & ~near
     missing = counts.degree - found.zeros
     if int(weights[known].sum()) != missing:
         known = _within_gap(polynomial, estimates, near, weights, counts.degree)
         if known is None:
-            known = estimates.is_known & ~near
+            known = _is_told(estimates) & ~near
     others = estimates.values[~known & ~near]
     found.listed = separated(polynomial, estimates, known, others, has_zeros=found.zeros > 0)
+    _count_missing_zeros(polynomial, found, counts)
     _judge(polynomial, found, counts)
     return found
+
+
+def _count_missing_zeros(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) -> None:
+    """Count by circles just below and above the list where it is too short: QZ may lose eigenvalues at the origin."""
+    size = np.abs(found.listed.values)
+    if size.size == 0 or found.zeros + size.size == counts.degree:
+        return
+    around, below = (contour(polynomial, 0.0, radius).count for radius in (OUTSIDE * size.max(), size.min() / OUTSIDE))
+    if around is not None and below is not None and around == below + size.size and below > found.zeros:
+        found.zeros, found.radius = below, max(found.radius, float(np.sqrt(TINY) * size.min()))
+
+
+def _first(weights: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:
+    """Mark the smallest estimates, as many as stand for a number of eigenvalues."""
+    return np.asarray(np.cumsum(weights) - weights < count)
 
 
 def _weights(polynomial: ScaledPolynomial, estimates: Estimates) -> npt.NDArray[np.int64]:
@@ -107,11 +136,27 @@ def _weights(polynomial: ScaledPolynomial, estimates: Estimates) -> npt.NDArray[
     return np.where((estimates.values.imag != 0.0) & polynomial.is_real, 2, 1)
 
 
+def _is_told(estimates: Estimates) -> npt.NDArray[np.bool_]:
+    """Tell which estimates are known, but for those that parts of some hundred roundings make far above all others.
+
+    A product of matrices rounds by tens of eps, which the entries of the result do not show.
+    """
+    told = estimates.is_known
+    places = np.flatnonzero(told)
+    size, bounds = np.abs(estimates.values[places]), estimates.bounds[places]
+    clear = np.flatnonzero(bounds <= FAINT * size)
+    first = int(clear[-1]) + 1 if clear.size else places.size
+    if 0 < first < places.size and size[first] > FAR_ABOVE * size[first - 1]:
+        told[places[first:]] = False
+    return told
+
+
 def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArray[np.bool_]:
-    """Tell which estimates stand for eigenvalues at the origin: the smallest, and those within their bounds of it."""
-    near = (np.abs(estimates.values) <= estimates.bounds) & (estimates.bounds <= 1.0)
-    last = np.flatnonzero(near & np.isfinite(estimates.bounds))
-    near = np.arange(near.size) <= (last[-1] if last.size and exact else -1) if exact else near
+    """Tell which estimates stand for eigenvalues at the origin: below all known ones, and not told from zero."""
+    size = np.abs(estimates.values)
+    known = np.flatnonzero(estimates.is_known)
+    below = np.arange(size.size) < known[0] if known.size else size <= TINY
+    near = below & ~(estimates.bounds <= KNOWN * size)  # bounds may be nan where all is zero
     total = 0
     for k, value in enumerate(estimates.values):
         if total >= exact:
@@ -122,27 +167,24 @@ def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArra
 
 
 def _count_zeros(
-    polynomial: ScaledPolynomial,
-    estimates: Estimates,
-    near: npt.NDArray[np.bool_],
-    counts: ExactCounts,
-    found: _Findings,
-) -> None:
-    """Count what is not told from zero by a circle between it and the rest."""
-    inner = float(np.abs(estimates.values[near]).max(initial=0.0))
-    outer = float(np.abs(estimates.values[~near]).min(initial=np.inf))
-    radius = np.sqrt(inner * outer) if np.isfinite(outer) else OUTSIDE * inner
-    count = contour(polynomial, 0.0, radius).count
-    found.zeros = int(count) if count is not None else int(_weights(polynomial, estimates)[near].sum())
-    found.zeros = max(found.zeros, counts.at_origin)
-    found.radius = float(np.maximum(np.abs(estimates.values[near]), estimates.radii[near]).max(initial=0.0))
-    more = found.zeros - counts.at_origin
-    if more > 0:
-        found.doubts.append(
-            f"{more} of {counts.degree} eigenvalues are within {found.radius * polynomial.unit:.2g} rad/s of the origin "
-            "and not told from zero by numbers that are known to their last digit: free bodies in rounded numbers have "
-            "such eigenvalues instead of zeros"
-        )
+    polynomial: ScaledPolynomial, estimates: Estimates, near: npt.NDArray[np.bool_], exact: int
+) -> tuple[int, float]:
+    """Count what is not told from zero by a circle between it and the rest; none if it is elsewhere than around zero."""
+    size = np.abs(estimates.values)
+    inner, outer = float(size[near].max(initial=0.0)), float(size[~near].min(initial=np.inf))
+    spread = float(np.maximum(size, np.minimum(estimates.radii, TINY))[near].max(initial=0.0))
+    if not np.isfinite(outer):
+        outer = OUTSIDE**2 * max(inner, TINY)
+    for part in PLACES:
+        radius = max(inner, TINY**3 * outer) ** (1.0 - part) * outer**part
+        circle = contour(polynomial, 0.0, radius)
+        if circle.count is None:
+            continue
+        mean = abs(complex(circle.moments[1] * radius)) / max(circle.count, 1)
+        if mean > AROUND * inner and mean > TINY**2 * radius:
+            return exact, 0.0
+        return max(circle.count, exact), min(spread, radius)
+    return max(int(_weights(polynomial, estimates)[near].sum()), exact), spread
 
 
 def _within_gap(
@@ -173,6 +215,12 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
     """Compare the number of what was found with the exact one, and prove the list."""
     total = found.zeros + found.listed.values.size
     largest = float(np.abs(found.listed.values).max(initial=0.0))
+    if found.zeros > counts.at_origin:
+        found.doubts.append(
+            f"{found.zeros - counts.at_origin} of {counts.degree} eigenvalues are within "
+            f"{found.radius * polynomial.unit:.2g} rad/s of the origin and not told from zero: free bodies in rounded "
+            "numbers have such eigenvalues instead of zeros"
+        )
     if total != counts.degree:
         within = contour(polynomial, 0.0, OUTSIDE * largest).count if largest > 0.0 else None
         told = f"{total} eigenvalues are told from rounding, up to {largest * polynomial.unit:.3g} rad/s"

@@ -41,10 +41,8 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
     doubts = list(spectrum.doubts)
     if share > UNDECIDED:
         doubts.append(nearly_singular(share))
-    blocks = counts.blocks
-    if spectrum.values.size != counts.degree:
-        blocks, doubt = _meant_blocks(coefficients, counts, spectrum.values.size)
-        doubts.append(doubt)
+    blocks, doubt = _blocks(coefficients, counts, spectrum.values.size)
+    doubts += doubt
     return FoundStructure(
         values=spectrum.values,
         bounds=spectrum.bounds,
@@ -86,14 +84,17 @@ def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:
     )
 
 
-def _meant_blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], str]:
-    """Return the blocks at infinity that go with the smaller count, by ranks up to rounding, and how sure they are."""
+def _blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], list[str]]:
+    """Return the blocks at infinity that go with the count of finite eigenvalues, and how sure they are.
+
+    Beside the exact ones there are those by ranks up to rounding, which stand for what was meant where rounding made
+    eigenvalues of its own.
+    """
     pencil = first_order_pencil(coefficients)
-    blocks = infinite_part(pencil.A, pencil.E).blocks
-    if sum(blocks) + finite == len(pencil.E):
-        index, exact = max(blocks, default=0), max(counts.blocks, default=0)
-        return blocks, f"the index is {index} by ranks up to rounding and {exact} of the stored numbers"
-    return counts.blocks, (
-        f"the blocks at infinity are those of the stored numbers, which have {counts.degree} finite eigenvalues; ranks "
-        "up to rounding give no blocks that go with fewer"
-    )
+    rounded = infinite_part(pencil.A, pencil.E).blocks
+    if rounded == counts.blocks:
+        return rounded, []
+    index, exact = max(rounded, default=0), max(counts.blocks, default=0)
+    doubt = f"the index is {exact} of the stored numbers and {index} by ranks up to rounding"
+    is_meant = finite != counts.degree and sum(rounded) + finite == len(pencil.E)
+    return (rounded if is_meant else counts.blocks), [doubt] if exact != index else []
