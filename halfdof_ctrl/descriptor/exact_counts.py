@@ -12,6 +12,7 @@ anywhere. What comes out is a fact about the doubles; what was meant by them may
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -43,13 +44,19 @@ class ExactCounts:
         return tuple([sum(step > block for step in self.steps) for block in range(max(self.steps, default=0))])
 
 
-def exact_counts(coefficients: Sequence[Matrix]) -> ExactCounts:
+def exact_counts(
+    coefficients: Sequence[Matrix], *, at_infinity: bool = True, primes: Sequence[int] = PRIMES
+) -> ExactCounts:
     """Count what the square matrix polynomial has, modulo two primes.
 
     Parameters
     ----------
     coefficients : sequence of (n, n) ndarrays
         Of 1, s, s^2, real or complex.
+    at_infinity : bool
+        Whether `steps` are asked for, which take a reduction each.
+    primes : sequence of int
+        Moduli; one is enough where the counts of all blocks together are known.
 
     Returns
     -------
@@ -65,7 +72,7 @@ def exact_counts(coefficients: Sequence[Matrix]) -> ExactCounts:
     >>> counts.degree, counts.blocks, counts.at_origin
     (2, (3,), 0)
     """
-    found = [_counts(coefficients, p) for p in PRIMES]
+    found = [_counts(coefficients, p, at_infinity=at_infinity) for p in primes]
     return max(found, key=lambda counts: (counts.rank, counts.degree, -counts.at_origin))
 
 
@@ -100,6 +107,22 @@ def invertible_part(N: Residues, p: int) -> tuple[Residues, list[int]]:
         N = product(rows, N[:, places], p)  # N = L R with L its pivot columns: R L has the same nonzero eigenvalues
 
 
+def core(N: Residues, p: int) -> Residues:
+    """Return a matrix with the nonzero eigenvalues of N without the ranks between, by squaring."""
+    power, size = N, len(N)
+    while True:
+        _, places = reduced(power, p)
+        if places.size == len(N):
+            return N
+        if places.size == size:
+            break
+        size, power = int(places.size), product(power, power, p)
+    Q = power[:, places]  # spans what all powers leave: N Q = Q X
+    _, rows = reduced(Q.T.copy(), p)
+    both = np.hstack([Q[rows], product(N[rows], Q, p)])
+    return reduced(both, p, Q.shape[1])[0][:, Q.shape[1] :]
+
+
 def random_point(p: int) -> int:
     """Return a point that knows nothing of the numbers."""
     return int(np.random.default_rng(SEED).integers(2**16, p - 1))
@@ -113,17 +136,22 @@ def at_point(parts: Sequence[Residues], s0: int, p: int) -> Residues:
     return value
 
 
-def _counts(coefficients: Sequence[Matrix], p: int) -> ExactCounts:
+def _counts(coefficients: Sequence[Matrix], p: int, *, at_infinity: bool) -> ExactCounts:
     parts, s0 = [residues(part, p) for part in coefficients], random_point(p)
     n = len(parts[0])
     N, normal, r = shifted_inverse(parts, s0, p)
     if N is None:
         return ExactCounts(size=n, rank=normal, dimension=n + r, degree=0, at_origin=0, steps=())
-    inner, ranks = invertible_part(N, p)
-    sizes = [n + r, *ranks]
-    steps = tuple([larger - smaller for larger, smaller in zip(sizes[:-1], sizes[1:], strict=True)])
-    unit = np.eye(len(inner), dtype=np.int64)
-    rest, _ = invertible_part((unit - s0 * inner) % p, p)
-    return ExactCounts(
-        size=n, rank=n, dimension=n + r, degree=len(inner), at_origin=len(inner) - len(rest), steps=steps
-    )
+    steps: tuple[int, ...] = ()
+    if at_infinity:
+        inner, ranks = invertible_part(N, p)
+        steps = tuple([larger - smaller for larger, smaller in pairwise([n + r, *ranks])])
+    else:
+        inner = core(N, p)
+    zeros = 0 if rank(parts[0], p) == n else zeros_at_origin(inner, s0, p)
+    return ExactCounts(size=n, rank=n, dimension=n + r, degree=len(inner), at_origin=zeros, steps=steps)
+
+
+def zeros_at_origin(N: Residues, s0: int, p: int) -> int:
+    """Count the eigenvalues at the origin, where I - s_0 N is singular."""
+    return len(N) - len(core((np.eye(len(N), dtype=np.int64) - s0 * N) % p, p))

@@ -22,6 +22,7 @@ from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.groups import Listed, separated
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
 from halfdof_ctrl.descriptor.quotients import KNOWN, Estimates, eigenvalue_estimates
+from halfdof_ctrl.descriptor.residues import PRIMES
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
 OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
@@ -60,30 +61,37 @@ class _Findings:
     doubts: list[str] = field(default_factory=list)
 
 
-def finite_spectrum(coefficients: Sequence[Matrix], counts: ExactCounts) -> FiniteSpectrum:
+def finite_spectrum(
+    coefficients: Sequence[Matrix], counts: ExactCounts | None = None, *, primes: Sequence[int] = PRIMES
+) -> FiniteSpectrum:
     """Find the finite eigenvalues of a regular matrix polynomial.
 
     Parameters
     ----------
     coefficients : sequence of (n, n) ndarrays
         Of 1, s, s^2.
-    counts : ExactCounts
-        Of the same.
+    counts : ExactCounts, optional
+        Of the same, where they are known.
+    primes : sequence of int
+        For counts of their blocks.
     """
     blocks = diagonal_blocks(np.any([part != 0.0 for part in coefficients], axis=0))
     values, bounds, doubts = [np.zeros(0, dtype=np.complex128)], [np.zeros(0)], []
+    most = 0
     for rows, columns in blocks:
         parts = [part[np.ix_(rows, columns)] for part in coefficients]
-        of_block = counts if len(blocks) == 1 else exact_counts(parts)
+        if counts is not None and len(blocks) == 1:
+            of_block = counts
+        else:
+            of_block = exact_counts(parts, at_infinity=False, primes=primes)
         polynomial = ScaledPolynomial.of(parts)
         found = _of_block(polynomial, of_block)
         zeros = np.zeros(found.zeros)
         values += [zeros.astype(np.complex128), found.listed.values * polynomial.unit]
         bounds += [_zero_bounds(found, of_block.at_origin) * polynomial.unit, found.listed.bounds * polynomial.unit]
         doubts += found.doubts
-    return FiniteSpectrum(
-        values=np.concatenate(values), bounds=np.concatenate(bounds), most=counts.degree, doubts=tuple(doubts)
-    )
+        most += of_block.degree
+    return FiniteSpectrum(values=np.concatenate(values), bounds=np.concatenate(bounds), most=most, doubts=tuple(doubts))
 
 
 def _zero_bounds(found: _Findings, exact: int) -> FloatArray:

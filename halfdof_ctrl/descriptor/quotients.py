@@ -29,6 +29,8 @@ STEP_IN_BOUNDS = 1000.0  #: nor does one within so many bounds
 ROUNDS = 4  #: of inverse iteration at most
 ITERATIONS = 2  #: of inverse iteration from each side
 SETTLED = 4.0  #: a step within so many bounds ends the rounds
+SLOW = 0.3  #: rounds end where a step is not smaller by this factor, and not within the bound
+MOST_ITERATED = 100  #: eigenvalues that are iterated, each of which takes factorizations
 FARTHEST = 1e100  #: starts beyond are infinite
 KNOWN = 0.05  #: an eigenvalue is told from others where its bound is below this part of its size
 LOST = 0.3  #: a start that moves by more than this part of its size belongs to no eigenvalue nearby
@@ -54,15 +56,18 @@ def eigenvalue_estimates(polynomial: ScaledPolynomial) -> Estimates:
     starts, x, y = _starts(polynomial)
     values, bounds, steps, radii = _quotients(polynomial, starts, x, y)
     is_settled = _is_small(steps, values, bounds)
-    unsettled = np.flatnonzero(~is_settled & np.isfinite(starts))
+    unsettled = np.flatnonzero(~is_settled)
     if unsettled.size:
         exact = ExactPolynomial(polynomial.coefficients)
-        for k in unsettled.tolist():
+        worth = unsettled[bounds[unsettled] <= np.abs(starts[unsettled])]
+        worth = worth[np.argsort(bounds[worth] / np.abs(starts[worth]), kind="stable")][:MOST_ITERATED]
+        for k in worth.tolist():
             value, bound, is_settled[k] = _iterated(polynomial, exact, starts[k], x[:, k], y[:, k])
             if is_settled[k]:
                 values[k], bounds[k] = value, bound
-            else:  # multiple or none: where QZ has it, uncertain by what the step would have been
-                values[k], bounds[k] = starts[k], max(bounds[k], min(steps[k], np.abs(starts[k])))
+        unsettled = np.flatnonzero(~is_settled)  # multiple or none: where QZ has it, uncertain by the step to be taken
+        values[unsettled] = starts[unsettled]
+        bounds[unsettled] = np.fmax(bounds[unsettled], np.fmin(steps[unsettled], np.abs(starts[unsettled])))
     order = np.argsort(np.abs(values), kind="stable")
     return Estimates(values[order], bounds[order], np.minimum(radii, bounds)[order], is_settled[order])
 
@@ -117,7 +122,7 @@ def _iterated(
     polynomial: ScaledPolynomial, exact: ExactPolynomial, start: complex, x: ComplexArray, y: ComplexArray
 ) -> tuple[complex, float, bool]:
     """Improve one eigenvalue by inverse iteration and quotients whose residual is exact but for one rounding."""
-    s, bound, is_settled = start, np.inf, False
+    s, bound, last, is_settled = start, np.inf, np.inf, False
     _, R1, R2 = polynomial.coefficients
     with np.errstate(all="ignore"):
         for _ in range(ROUNDS):
@@ -132,6 +137,11 @@ def _iterated(
             )
             if not np.isfinite(step) or abs(step) > 2.0 * abs(s):
                 return s, bound, False
+            if abs(step) > max(
+                SLOW * last, SETTLED * bound, 2.0 * EPS * abs(s)
+            ):  # a multiple eigenvalue is not found in this way
+                return s, bound, False
+            last = abs(step)
             s = s - step
             is_settled = bool(abs(step) <= max(SETTLED * bound, 2.0 * EPS * abs(s)))
             if is_settled:

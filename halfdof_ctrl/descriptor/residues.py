@@ -141,6 +141,19 @@ def common_divisor(first: Residues, second: Residues, p: int) -> Residues:
     return first
 
 
+def multiplicity(polynomial: Residues, root: int, p: int) -> int:
+    """Return how often a polynomial, the highest coefficient first, has a root."""
+    count, coefficients = 0, [int(coefficient) for coefficient in polynomial]
+    while len(coefficients) > 1:
+        quotient = [0]
+        for coefficient in coefficients:
+            quotient.append((quotient[-1] * root + coefficient) % p)
+        if quotient.pop():
+            break
+        count, coefficients = count + 1, quotient[1:]
+    return count
+
+
 def _monic(polynomial: Residues, p: int) -> Residues:
     trimmed = np.trim_zeros(polynomial, "f")
     return trimmed * pow(int(trimmed[0]), -1, p) % p if trimmed.size else trimmed

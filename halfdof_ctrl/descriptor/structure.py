@@ -22,9 +22,10 @@ from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS, finite_part, infinite_part
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS, infinite_part
 from halfdof_ctrl.descriptor.found_structure import found_structure, order_by_size
 from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
+from halfdof_ctrl.descriptor.invariant_zeros import invariant_zeros
 from halfdof_ctrl.model.refusals import singular_pencil_error
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
 from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
@@ -182,16 +183,14 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
     require_regular(model)
     every = _independent(model)
-    pencil = first_order_pencil(system_pencil(model, *every))
-    part = finite_part(pencil.A, pencil.E)
-    if not part.is_certain:
+    found = invariant_zeros(system_pencil(model, *every))
+    if found.doubts:
         msg = (
-            f"The number of zeros, {part.eigenvalues.size}, is in doubt: a rank on which it rests is hardly to be told "
-            "from rounding. Inputs or outputs depend on each other but for rounding; leave one out by select() and "
-            "compare."
+            f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs depend "
+            "on each other but for rounding, or the model is rounded; leave one out by select() and compare."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
-    return _sorted(part.eigenvalues * pencil.scale)
+    return _sorted(found.values)
 
 
 def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
