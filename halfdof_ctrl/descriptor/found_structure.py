@@ -22,6 +22,7 @@ class FoundStructure:
     bounds: FloatArray  #: (k,) of the error of each [rad/s]
     most: int  #: finite eigenvalues of the stored numbers, exactly
     blocks: tuple[int, ...]  #: sizes of the blocks at infinity of the pencil (8), the largest first
+    most_index: int  #: the larger of the index of the stored numbers and that by ranks up to rounding
     is_regular: bool
     doubts: tuple[str, ...]
 
@@ -31,7 +32,13 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
     if not coefficients[0].size:
         empty = np.zeros(0)
         return FoundStructure(
-            values=empty.astype(np.complex128), bounds=empty, most=0, blocks=(), is_regular=True, doubts=()
+            values=empty.astype(np.complex128),
+            bounds=empty,
+            most=0,
+            blocks=(),
+            most_index=0,
+            is_regular=True,
+            doubts=(),
         )
     counts = exact_counts(coefficients)
     if not counts.is_regular:
@@ -41,13 +48,14 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
     doubts = list(spectrum.doubts)
     if share > UNDECIDED:
         doubts.append(nearly_singular(share))
-    blocks, doubt = _blocks(coefficients, counts, spectrum.values.size)
+    blocks, most_index, doubt = _blocks(coefficients, counts, spectrum.values.size)
     doubts += doubt
     return FoundStructure(
         values=spectrum.values,
         bounds=spectrum.bounds,
         most=counts.degree,
         blocks=blocks,
+        most_index=most_index,
         is_regular=True,
         doubts=tuple(doubts),
     )
@@ -73,19 +81,20 @@ def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:
     pencil = first_order_pencil(coefficients)
     part = finite_part(pencil.A, pencil.E)
     doubt = "the number of eigenvalues of the regular part: a rank on which it rests is hardly to be told from rounding"
-    values = part.eigenvalues * pencil.scale
+    values, blocks = part.eigenvalues * pencil.scale, infinite_part(pencil.A, pencil.E).blocks
     return FoundStructure(
         values=values,
         bounds=np.full(values.size, np.inf),
         most=values.size,
-        blocks=infinite_part(pencil.A, pencil.E).blocks,
+        blocks=blocks,
+        most_index=max(blocks, default=0),
         is_regular=False,
         doubts=() if part.is_certain else (doubt,),
     )
 
 
-def _blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], list[str]]:
-    """Return the blocks at infinity that go with the count of finite eigenvalues, and how sure they are.
+def _blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], int, list[str]]:
+    """Return the blocks at infinity that go with the count of finite eigenvalues, the larger index, and doubts.
 
     Beside the exact ones there are those by ranks up to rounding, which stand for what was meant where rounding made
     eigenvalues of its own.
@@ -93,8 +102,8 @@ def _blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) ->
     pencil = first_order_pencil(coefficients)
     rounded = infinite_part(pencil.A, pencil.E).blocks
     if rounded == counts.blocks:
-        return rounded, []
+        return rounded, max(rounded, default=0), []
     index, exact = max(rounded, default=0), max(counts.blocks, default=0)
     doubt = f"the index is {exact} of the stored numbers and {index} by ranks up to rounding"
     is_meant = finite != counts.degree and sum(rounded) + finite == len(pencil.E)
-    return (rounded if is_meant else counts.blocks), [doubt] if exact != index else []
+    return (rounded if is_meant else counts.blocks), max(index, exact), [doubt] if exact != index else []

@@ -7,17 +7,18 @@ With S_ij(s) the system pencil (9) of one input and one output,
 Most pairs need no determinant. P(s)^-1 grows at most as s^(index - 1), which settles displacements under forces up to
 index one. For the rest, H(s) is a strictly proper part and a polynomial D_0 + D_1 s + D_2 s^2 + ..., and Cauchy's
 formula on a circle around all finite eigenvalues gives its coefficients for all pairs at once. Only where rounding
-leaves one of them in doubt the degrees in (20) are counted.
+leaves one of them in doubt the degrees in (20) are counted, exactly.
 """
 
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.descriptor.finite_part import finite_part
-from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
+from halfdof_ctrl.descriptor.exact_counts import exact_counts
+from halfdof_ctrl.descriptor.first_order import time_scale
 
 IntArray = npt.NDArray[np.int64]
 
@@ -28,7 +29,9 @@ ROUNDED = 16.0  #: coefficients below so many of their rounding errors are zero
 CLEAR = 4096.0  #: coefficients above so many are not
 
 
-def improper_pairs(model: SecondOrderModel, eigenvalues: ComplexArray, index: int) -> tuple[tuple[str, str, int], ...]:
+def improper_pairs(
+    model: SecondOrderModel, eigenvalues: ComplexArray, index: int, degree: int | None = None
+) -> tuple[tuple[str, str, int], ...]:
     """List the (input, output, order of growth) of all transfer functions that grow with frequency.
 
     Parameters
@@ -39,25 +42,49 @@ def improper_pairs(model: SecondOrderModel, eigenvalues: ComplexArray, index: in
         Its finite eigenvalues.
     index : int
         Index of the pencil (8).
+    degree : int, optional
+        Of det P of the stored numbers exactly, where it is larger than the number of eigenvalues that are known.
 
     Returns
     -------
     tuple of (str, str, int)
         Output by output, as matrices are read.
+
+    Raises
+    ------
+    UncertainRankError
+        A part that grows is of the size of rounding, and the stored numbers were rounded.
     """
-    order = growth_orders(model, eigenvalues, index)
+    order = growth_orders(model, eigenvalues, index, degree)
     return tuple([(model.inputs[j], model.outputs[i], int(order[i, j])) for i, j in np.argwhere(order > 0).tolist()])
 
 
-def growth_orders(model: SecondOrderModel, eigenvalues: ComplexArray, index: int) -> IntArray:
+def growth_orders(
+    model: SecondOrderModel, eigenvalues: ComplexArray, index: int, degree: int | None = None
+) -> IntArray:
     """Find the order of growth of each pair (p, m), 0 for all that do not grow."""
     bound = _bounds(model, index)
     if bound.max() <= 0:
         return np.zeros_like(bound)
-    order, unclear = _by_circle(model, eigenvalues, bound)
+    order, unclear, size = _by_circle(model, eigenvalues, bound)
+    if unclear.any() and degree is not None and degree != eigenvalues.size:
+        raise _undecided(model, unclear, size)
     for i, j in np.argwhere(unclear).tolist():
-        order[i, j] = max(0, _finite_count(model, i, j) - eigenvalues.size)
+        order[i, j] = max(0, _degree_of_pair(model, i, j) - eigenvalues.size)
     return order
+
+
+def _undecided(model: SecondOrderModel, unclear: npt.NDArray[np.bool_], size: FloatArray) -> UncertainRankError:
+    """Refuse to tell a part that grows from rounding."""
+    i, j = np.argwhere(unclear)[0].tolist()
+    ratio = float(size[i, j])
+    msg = (
+        f"Whether the transfer function from {model.inputs[j]} to {model.outputs[i]} grows with frequency cannot be told: "
+        f"its part that grows is {ratio:.0f} times what rounding of M, C, K lets it be, where {ROUNDED:.0f} times are "
+        f"rounding and {CLEAR:.0f} times are not, and the stored numbers are rounded ones. Give the model in the "
+        "coordinates in which its constraints are plain numbers, or in units in which its entries are of one size."
+    )
+    return UncertainRankError(msg, dofs=(model.inputs[j], model.outputs[i]), gap=ratio)
 
 
 def _bounds(model: SecondOrderModel, index: int) -> IntArray:
@@ -77,8 +104,8 @@ def _degrees(coefficients: tuple[Matrix, ...]) -> IntArray:
 
 def _by_circle(
     model: SecondOrderModel, eigenvalues: ComplexArray, bound: IntArray
-) -> tuple[IntArray, npt.NDArray[np.bool_]]:
-    """Find the last coefficient of each polynomial part, and the pairs of which rounding does not let one be sure."""
+) -> tuple[IntArray, npt.NDArray[np.bool_], FloatArray]:
+    """Find the last coefficient of each polynomial part, the pairs that are unclear, and sizes in units of rounding."""
     most = int(bound.max())
     count = max(FEWEST_POINTS, 2 ** int(np.ceil(np.log2(4 * (most + 1)))))
     largest = float(np.abs(eigenvalues).max(initial=0.0))
@@ -98,14 +125,15 @@ def _by_circle(
     present = possible & ~(parts <= ROUNDED * rounding)
     clear = possible & (parts > CLEAR * rounding)
     order, at_least = (np.where(which, powers, 0).max(axis=2) for which in (present, clear))
-    return order, order > at_least
+    with np.errstate(invalid="ignore", divide="ignore"):
+        size = np.where(present & ~clear, parts / rounding, 0.0).max(axis=2)
+    return order, order > at_least, size
 
 
-def _finite_count(model: SecondOrderModel, i: int, j: int) -> int:
-    """Count the finite eigenvalues of the system pencil of one pair, the degree of its determinant."""
-    pencil = first_order_pencil(system_pencil(model, [i], [j]))
-    part = finite_part(pencil.A, pencil.E)
-    return part.eigenvalues.size if part.is_regular else NO_GROWTH
+def _degree_of_pair(model: SecondOrderModel, i: int, j: int) -> int:
+    """Return the degree of the determinant of the system pencil of one pair, exactly."""
+    counts = exact_counts(system_pencil(model, [i], [j]), at_infinity=False)
+    return counts.degree if counts.is_regular else NO_GROWTH
 
 
 def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[Matrix]:

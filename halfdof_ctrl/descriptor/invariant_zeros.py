@@ -60,15 +60,18 @@ def invariant_zeros(coefficients: Sequence[Matrix]) -> Zeros:
     if coefficients[0].shape == (rank, rank):
         spectrum = finite_spectrum(coefficients)
         return Zeros(spectrum.values, spectrum.doubts)
-    common = [_common(coefficients, rank, p) for p in PRIMES]
-    count, at_origin = min(common)
+    found = (_common(coefficients, rank, p) for p in PRIMES)
+    count, at_origin = next((common for common in found if common is not None), (0, 0))
     if count == at_origin:
         return Zeros(np.zeros(count, dtype=np.complex128), ())
     return _common_roots([_combined(coefficients, rank, seed) for seed in SEEDS], count, at_origin)
 
 
-def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int]:
-    """Count the roots that two random combinations of minors have in common, and those at the origin, modulo a prime."""
+def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int] | None:
+    """Count the roots that two random combinations of minors have in common, and those at the origin, modulo a prime.
+
+    That polynomials without a common root have one modulo p happens once in p.
+    """
     parts, s0 = [residues(part, p) for part in coefficients], random_point(p)
     generator = np.random.default_rng(SEEDS)
     polynomials, zeros = [], []
@@ -79,7 +82,7 @@ def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int
             square = [((part[:rank] + product(factors, part[rank:], p)) % p).T for part in square]
         N, _, _ = shifted_inverse(square, s0, p)
         if N is None:  # the combinations are no random ones modulo this prime
-            return 2 * rank, 0
+            return None
         found = np.trim_zeros(characteristic(N, p), "b")  # without the eigenvalues at infinity
         polynomials.append(found)
         zeros.append(multiplicity(found, pow(s0, -1, p), p))

@@ -37,6 +37,7 @@ class PencilStructure:
 
     finite_eigenvalues: ComplexArray  #: [rad/s], sorted by size; those at the origin are exactly zero
     bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
+    most_index: int  #: the index, or a larger one that the ranks up to rounding have
     most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
@@ -70,10 +71,13 @@ class PencilStructure:
 
     @cached_property
     def improper_pairs(self) -> tuple[tuple[str, str, int], ...]:
-        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for."""
+        """The (input, output, order of growth) of transfer functions that grow with frequency, found when asked for.
+
+        Raises `UncertainRankError` where rounding left a part of its own size that may grow.
+        """
         if not self.is_regular:
             return ()
-        return improper_pairs(self.model, self.finite_eigenvalues, self.index)
+        return improper_pairs(self.model, self.finite_eigenvalues, self.most_index, self.most_finite)
 
 
 def pencil_structure(model: SecondOrderModel) -> PencilStructure:
@@ -123,6 +127,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     return PencilStructure(
         finite_eigenvalues=read_only(found.values[order]),
         bounds=read_only(found.bounds[order]),
+        most_index=found.most_index,
         most_finite=found.most,
         n_infinite=2 * len(model.dofs) - found.values.size,
         infinite_blocks=found.blocks,
