@@ -2,8 +2,8 @@
 
 ``K x + s (C x) + s^2 (M x)`` is worked term by term: the sum ``K + s C + s^2 M`` would lose what is small in it before
 anything is multiplied. Sums and products of two doubles are split into a double and its error (T. J. Dekker, 1971;
-D. E. Knuth). Matrix products are made exact by slices (K. Ozaki and others, 2012): the leading bits of the entries are so
-few that their products add up without rounding, in whatever order a library does it; what is left is small and is
+D. E. Knuth). Matrix products are made exact by slices (K. Ozaki and others, 2012): the leading bits of the entries are
+so few that their products add up without rounding, in whatever order a library does it; what is left is small and is
 multiplied as usual. `numpy.longdouble` would not do, which is a double on Windows and on Apple's processors.
 """
 
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
-from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, is_sparse
+from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
@@ -34,20 +34,21 @@ class SlicedMatrix:
     bits: int
 
     @classmethod
-    def of(cls, matrix: FloatArray | SparseMatrix) -> "SlicedMatrix":
+    def of(cls, matrix: Matrix) -> "SlicedMatrix":
         """Cut a real dense or sparse matrix row by row."""
         if is_sparse(matrix):
             entries = csc_array(as_sparse(matrix))
             size = np.zeros(entries.shape[0])
             np.maximum.at(size, entries.indices, np.abs(entries.data))
             longest = int(np.bincount(entries.indices, minlength=1).max(initial=1))
-            parts, bits = _cut(entries.data, powers_of_two(size)[entries.indices], longest)
-            return cls(
-                *[csc_array((part, entries.indices, entries.indptr), shape=entries.shape) for part in parts], bits
-            )
+            (first, second, rest), bits = _cut(entries.data, powers_of_two(size)[entries.indices], longest)
+            place = (entries.indices, entries.indptr)
+            shaped = [csc_array((part, *place), shape=entries.shape) for part in (first, second, rest)]
+            return cls(shaped[0], shaped[1], shaped[2], bits)
         array = np.asarray(matrix, dtype=float)
-        parts, bits = _cut(array, powers_of_two(np.abs(array).max(axis=1, initial=0.0))[:, None], array.shape[1])
-        return cls(*parts, bits)
+        scale = powers_of_two(np.abs(array).max(axis=1, initial=0.0))[:, None]
+        (first, second, rest), bits = _cut(array, scale, array.shape[1])
+        return cls(first, second, rest, bits)
 
     def times(self, x: FloatArray) -> list[FloatArray]:
         """Return parts whose sum is the product with an (n, k) array: three exact ones and one that is small."""
@@ -167,7 +168,7 @@ def _added(a: Pair, b: Pair) -> Pair:
 def _cut(
     values: FloatArray, scale: npt.NDArray[np.float64], terms: int, bits: int | None = None
 ) -> tuple[tuple[FloatArray, FloatArray, FloatArray], int]:
-    """Cut numbers into leading bits, as many below 1 / scale as sums of so many products allow, the next ones, the rest."""
+    """Cut numbers into leading bits, as many below 1 / scale as sums of that length allow, the next, and the rest."""
     count = (BITS - 1 - int(np.ceil(np.log2(max(terms, 1))))) // 2 if bits is None else bits
     unit = 2.0**count
     first = np.rint(values * scale * unit) / unit / scale

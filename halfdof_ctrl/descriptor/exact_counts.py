@@ -1,4 +1,4 @@
-"""What the stored numbers say exactly about ``P(s) = R_0 + R_1 s + R_2 s^2``: regularity, degree, infinite blocks, zeros.
+"""What the stored numbers say exactly about ``P(s) = R_0 + R_1 s + R_2 s^2``: regularity, degree, blocks.
 
 With R_2 = U V and the pencil (8), E = [R_1, U; V, 0] and A = [-R_0, 0; 0, I], one matrix at a random point s_0,
 

@@ -2,8 +2,8 @@
 
 Three things are found apart from each other and must agree: the exact count of the stored numbers (`exact_counts`), the
 eigenvalues that quotients with QZ vectors make sharp (`quotients`), and where these are fewer, the count by circles
-(`contours`). The list that comes out is proved in the end: ``sum 1 / (s - s_i) = tr P(s)^-1 P'(s)`` at a few s, where one
-that is missing, doubled or invented shows as a number of order one.
+(`contours`). The list that comes out is proved in the end: ``sum 1 / (s - s_i) = tr P(s)^-1 P'(s)`` at a few s, where
+one that is missing, doubled or invented shows as a number of order one.
 
 Stored numbers that were rounded may have eigenvalues that nobody meant, of the size of the parts that rounding left:
 zeros of a free body become small numbers, infinite eigenvalues large ones. So the count is an interval from what is
@@ -114,9 +114,8 @@ def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
             known = _is_told(estimates) & ~near
     missing = counts.degree - found.zeros
     if int(weights[known].sum()) != missing:
-        known = _within_gap(polynomial, estimates, near, weights, counts.degree)
-        if known is None:
-            known = _is_told(estimates) & ~near
+        within = _within_gap(polynomial, estimates, near, weights, counts.degree)
+        known = known if within is None else within
     others = estimates.values[~known & ~near]
     found.listed = separated(polynomial, estimates, known, others, has_zeros=found.zeros > 0)
     _count_missing_zeros(polynomial, found, counts)
@@ -177,7 +176,7 @@ def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArra
 def _count_zeros(
     polynomial: ScaledPolynomial, estimates: Estimates, near: npt.NDArray[np.bool_], exact: int
 ) -> tuple[int, float]:
-    """Count what is not told from zero by a circle between it and the rest; none if it is elsewhere than around zero."""
+    """Count what is not told from zero by a circle between it and the rest; none if it is not around zero."""
     size = np.abs(estimates.values)
     inner, outer = float(size[near].max(initial=0.0)), float(size[~near].min(initial=np.inf))
     spread = float(np.maximum(size, np.minimum(estimates.radii, TINY))[near].max(initial=0.0))
@@ -244,8 +243,8 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
     found.doubts += found.listed.doubts
     if total and not _is_proved(polynomial, found, largest):
         found.doubts.append(
-            f"the list of {total} eigenvalues does not reproduce the logarithmic derivative of det P(s): some are missing, "
-            "doubled or invented"
+            f"the list of {total} eigenvalues does not reproduce the logarithmic derivative of det P(s): some are "
+            "missing, doubled or invented"
         )
 
 

@@ -64,8 +64,8 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
 def nearly_singular(share: float) -> str:
     """Say that a model is regular by no more than rounding."""
     return (
-        f"the stored numbers are regular, but changes of {np.finfo(float).eps / share:.1e} of each entry can make det P(s) "
-        f"vanish identically, and rounding is {np.finfo(float).eps:.1e}"
+        f"the stored numbers are regular, but changes of {np.finfo(float).eps / share:.1e} of each entry can make "
+        f"det P(s) vanish identically, and rounding is {np.finfo(float).eps:.1e}"
     )
 
 

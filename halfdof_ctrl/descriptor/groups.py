@@ -1,8 +1,8 @@
 """Multiple eigenvalues and close ones: what a contour around a group says, where the single estimates do not.
 
-Rounding splits an eigenvalue of multiplicity k by the k-th root of eps, so that estimates of it lie on a ring, each with
-a bound of the size of the ring. The number in a circle around the ring and the mean of them are known to many digits
-(`contours`): the number decides, and the mean is what each of them is.
+Rounding splits an eigenvalue of multiplicity k by the k-th root of eps, so that estimates of it lie on a ring, each
+with a bound of the size of the ring. The number in a circle around the ring and the mean of them are known to many
+digits (`contours`): the number decides, and the mean is what each of them is.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor.contours import contour
+from halfdof_ctrl.descriptor.contours import Contour, contour
 from halfdof_ctrl.descriptor.quotients import Estimates
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
@@ -100,7 +100,7 @@ def _groups(values: ComplexArray, bounds: FloatArray, doubtful: npt.NDArray[np.b
     distance = np.abs(v[:, None] - v)
     near = (distance <= REACH * (b[:, None] + b)) & (distance <= 0.7 * np.maximum(np.abs(v)[:, None], np.abs(v)))
     near |= distance <= CLOSE * np.abs(v)
-    count, labels = connected_components(csr_array(near), directed=False)
+    count, labels = connected_components(csr_array(near.astype(np.int8)), directed=False)
     return [places[labels == label] for label in range(count)]
 
 
@@ -125,17 +125,25 @@ def _resolved(
         return values, bounds, None, "a group of eigenvalues near {:.4g} rad/s is not resolved"
     if circle.count == 0:
         return values[:0], bounds[:0], None, None
+    return (*_by_moments(circle, center, values, bounds), None, None)
+
+
+def _by_moments(
+    circle: Contour, center: complex, values: ComplexArray, bounds: FloatArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Return as many eigenvalues as a circle holds: one multiple, two from mean and spread, or the estimates."""
+    count, radius = int(circle.count or 0), circle.radius
     mean = complex(circle.moments[1] * radius / circle.moments[0])
     variance = complex(circle.moments[2] * radius**2 / circle.moments[0]) - mean**2
-    noise = radius * abs(complex(circle.moments[0]) - circle.count)
-    wide = float(np.sqrt(abs(variance)))
+    spread, wide = float(np.abs(values - center).max()), float(np.sqrt(abs(variance)))
+    noise = radius * abs(complex(circle.moments[0]) - count)
     if wide <= max(ALIKE * spread, FLOOR * abs(center)) or wide**2 <= 4.0 * noise * radius:
-        size = np.full(circle.count, max(noise, np.finfo(float).eps * abs(center)) + wide)
-        return np.full(circle.count, center + mean), size, None, None
-    if circle.count == PAIR:
+        size = max(noise, np.finfo(float).eps * abs(center)) + wide
+        return np.full(count, center + mean), np.full(count, size)
+    if count == PAIR:
         step = np.sqrt(variance)
         found = np.array([center + mean + step, center + mean - step])
-        return found, np.full(PAIR, min(float(bounds.max()), wide) + noise), None, None
-    if circle.count == values.size:
-        return values, np.maximum(bounds, wide), None, None
-    return np.full(circle.count, center + mean), np.full(circle.count, spread + wide), None, None
+        return found, np.full(PAIR, min(float(bounds.max()), wide) + noise)
+    if count == values.size:
+        return values, np.maximum(bounds, wide)
+    return np.full(count, center + mean), np.full(count, spread + wide)

@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.base.errors import UncertainRankError
-from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.descriptor.exact_counts import exact_counts
 from halfdof_ctrl.descriptor.first_order import time_scale
+from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 IntArray = npt.NDArray[np.int64]
 
@@ -79,9 +79,9 @@ def _undecided(model: SecondOrderModel, unclear: npt.NDArray[np.bool_], size: Fl
     i, j = np.argwhere(unclear)[0].tolist()
     ratio = float(size[i, j])
     msg = (
-        f"Whether the transfer function from {model.inputs[j]} to {model.outputs[i]} grows with frequency cannot be told: "
-        f"its part that grows is {ratio:.0f} times what rounding of M, C, K lets it be, where {ROUNDED:.0f} times are "
-        f"rounding and {CLEAR:.0f} times are not, and the stored numbers are rounded ones. Give the model in the "
+        f"Whether the transfer function from {model.inputs[j]} to {model.outputs[i]} grows with frequency cannot be "
+        f"told: its part that grows is {ratio:.0f} times what rounding of M, C, K lets it be, where {ROUNDED:.0f} times "
+        f"are rounding and {CLEAR:.0f} times are not, and the stored numbers are rounded ones. Give the model in the "
         "coordinates in which its constraints are plain numbers, or in units in which its entries are of one size."
     )
     return UncertainRankError(msg, dofs=(model.inputs[j], model.outputs[i]), gap=ratio)

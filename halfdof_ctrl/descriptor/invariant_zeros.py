@@ -86,7 +86,7 @@ def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int
         found = np.trim_zeros(characteristic(N, p), "b")  # without the eigenvalues at infinity
         polynomials.append(found)
         zeros.append(multiplicity(found, pow(s0, -1, p), p))
-    return int(common_divisor(*polynomials, p).size) - 1, min(zeros)
+    return int(common_divisor(polynomials[0], polynomials[1], p).size) - 1, min(zeros)
 
 
 def _combined(coefficients: Sequence[Matrix], rank: int, seed: int) -> list[Matrix]:
@@ -105,8 +105,8 @@ def _combined(coefficients: Sequence[Matrix], rank: int, seed: int) -> list[Matr
 
 def _squared(coefficients: Sequence[Matrix]) -> list[Matrix]:
     """Fill up with zeros to a square."""
-    k, l = coefficients[0].shape
-    return [np.pad(part, ((0, max(l - k, 0)), (0, max(k - l, 0)))) for part in coefficients]
+    rows, columns = coefficients[0].shape
+    return [np.pad(part, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0)))) for part in coefficients]
 
 
 def _common_roots(squares: Sequence[Sequence[Matrix]], count: int, at_origin: int) -> Zeros:

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.errors import UncertainRankError
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
@@ -44,6 +46,18 @@ def share_of_rounding(coefficients: Sequence[Matrix]) -> float:
             polynomial = ScaledPolynomial.of([part[np.ix_(rows, columns)] for part in coefficients])
             worst = max(worst, _of_block(polynomial))
     return worst
+
+
+def undecided_regularity(share: float, dofs: Sequence[str]) -> UncertainRankError:
+    """Refuse to tell whether a model is singular whose stored numbers are regular by no more than rounding."""
+    msg = (
+        f"Whether the pencil is singular cannot be told: the stored numbers are regular, but a change of each entry by "
+        f"{EPS / share:.1e} of itself may make det P(s) vanish at every s, and rounding of an entry is {EPS:.1e} (of a "
+        f"product of matrices tens of that). DOFs {listed(tuple(dofs))} take part in the motion that next to no force "
+        "resists. Give the model in the coordinates in which its constraints are plain numbers, remove what is "
+        "redundant, or give what is loose a stiffness that stands above rounding."
+    )
+    return UncertainRankError(msg, dofs=tuple(dofs), gap=1.0 / share)
 
 
 def _of_block(polynomial: ScaledPolynomial) -> float:

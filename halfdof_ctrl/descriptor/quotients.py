@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-from scipy.linalg.lapack import zgetrf
+from scipy.linalg.lapack import zgetrf, zgetrs
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial
@@ -122,44 +122,46 @@ def _iterated(
     polynomial: ScaledPolynomial, exact: ExactPolynomial, start: complex, x: ComplexArray, y: ComplexArray
 ) -> tuple[complex, float, bool]:
     """Improve one eigenvalue by inverse iteration and quotients whose residual is exact but for one rounding."""
-    s, bound, last, is_settled = start, np.inf, np.inf, False
-    _, R1, R2 = polynomial.coefficients
+    s, last = complex(start), float("inf")
     with np.errstate(all="ignore"):
         for _ in range(ROUNDS):
             x, y = _inverse_iteration(polynomial, s, x, y)
-            if not (np.isfinite(x).all() and np.isfinite(y).all()):
-                return s, np.inf, False
-            residual = -exact.residual(s, x[:, None])[:, 0]
-            slope = y @ (R1 @ x + 2.0 * s * (R2 @ x))
-            step = (y @ residual) / slope if slope != 0.0 else np.inf
-            bound = (
-                float(EPS * (np.abs(y) @ polynomial.sizes_at(s) @ np.abs(x)) / abs(slope)) if slope != 0.0 else np.inf
-            )
+            step, bound = _exact_step(polynomial, exact, s, x, y)
             if not np.isfinite(step) or abs(step) > 2.0 * abs(s):
-                return s, bound, False
-            if abs(step) > max(
-                SLOW * last, SETTLED * bound, 2.0 * EPS * abs(s)
-            ):  # a multiple eigenvalue is not found in this way
-                return s, bound, False
-            last = abs(step)
-            s = s - step
-            is_settled = bool(abs(step) <= max(SETTLED * bound, 2.0 * EPS * abs(s)))
-            if is_settled:
                 break
-    return s, bound, is_settled and abs(s - start) <= LOST * abs(s)
+            is_settled = abs(step) <= max(SETTLED * bound, 2.0 * EPS * abs(s))
+            if not is_settled and abs(step) > SLOW * last:  # a multiple eigenvalue is not found in this way
+                break
+            s, last = s - step, abs(step)
+            if is_settled:
+                return s, bound, abs(s - start) <= LOST * abs(s)
+    return s, float("inf"), False
+
+
+def _exact_step(
+    polynomial: ScaledPolynomial, exact: ExactPolynomial, s: complex, x: ComplexArray, y: ComplexArray
+) -> tuple[complex, float]:
+    """Return the step (32) and the bound (33)."""
+    _, R1, R2 = polynomial.coefficients
+    slope = complex(y @ (R1 @ x + 2.0 * s * (R2 @ x)))
+    if slope == 0.0 or not np.isfinite(slope):
+        return complex(np.inf), float("inf")
+    residual = complex(y @ -exact.residual(s, x[:, None])[:, 0])
+    rounding = EPS * float(np.abs(y) @ polynomial.sizes_at(s) @ np.abs(x))
+    return residual / slope, rounding / abs(slope)
 
 
 def _inverse_iteration(
     polynomial: ScaledPolynomial, s: complex, x: ComplexArray, y: ComplexArray
 ) -> tuple[ComplexArray, ComplexArray]:
     """Return better right and left vectors; a pivot that vanishes is as good as the last digit of the largest."""
-    P = polynomial.at(np.array([s]))[0]
-    lu, pivots, _ = zgetrf(P)
+    lu, pivots, _ = zgetrf(polynomial.at(np.array([s]))[0])
     diagonal = np.diagonal(lu)
     tiny = EPS * np.abs(diagonal).max(initial=0.0) * EPS
     weak = np.flatnonzero(np.abs(diagonal) <= tiny)
     lu[weak, weak] = tiny if tiny > 0.0 else 1.0
     for _ in range(ITERATIONS):
-        x, y = (scipy.linalg.lu_solve((lu, pivots), v, trans=turn, check_finite=False) for v, turn in ((x, 0), (y, 1)))
-        x, y = (v / np.abs(v).max(initial=0.0) for v in (x, y))
+        x, _ = zgetrs(lu, pivots, x, trans=0)
+        y, _ = zgetrs(lu, pivots, y, trans=1)
+        x, y = (vector / np.abs(vector).max(initial=0.0) for vector in (x, y))
     return x, y

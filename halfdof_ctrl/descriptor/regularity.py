@@ -13,11 +13,11 @@ from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import SingularPencilError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
-from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where P(s) is looked at, in units of the time scale
 SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero

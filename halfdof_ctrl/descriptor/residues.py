@@ -36,12 +36,12 @@ def residues(matrix: Matrix, p: int) -> Residues:
     1
     """
     if np.iscomplexobj(matrix):
-        return (residues(matrix.real, p) + residues(matrix.imag, p) * _root_of_minus_one(p)) % p
+        return np.asarray((residues(matrix.real, p) + residues(matrix.imag, p) * _root_of_minus_one(p)) % p)
     mantissa, exponent = np.frexp(np.asarray(matrix, dtype=float))
     integers = np.ldexp(mantissa, MANTISSA).astype(np.int64) % p
     exponents, places = np.unique(exponent, return_inverse=True)
     powers = np.array([pow(2, int(power) - MANTISSA, p) for power in exponents], dtype=np.int64)
-    return integers * powers[places].reshape(matrix.shape) % p
+    return np.asarray(integers * powers[places].reshape(matrix.shape) % p)
 
 
 def product(left: Residues, right: Residues, p: int) -> Residues:
@@ -55,7 +55,7 @@ def product(left: Residues, right: Residues, p: int) -> Residues:
     middle = (high + low) @ (top + bottom) - first - last
     shift = 1 << HALF
     upper = (first.astype(np.int64) % p * shift + middle.astype(np.int64)) % p
-    return (upper * shift + last.astype(np.int64)) % p
+    return np.asarray((upper * shift + last.astype(np.int64)) % p)
 
 
 def reduced(matrix: Residues, p: int, columns: int | None = None) -> tuple[Residues, Places]:
@@ -88,7 +88,7 @@ def reduced(matrix: Residues, p: int, columns: int | None = None) -> tuple[Resid
         rows, places = _pivots(work[free, start : min(start + PANEL, last)], p)
         if not rows:
             continue
-        chosen, among = free[rows], [start + place for place in places]
+        chosen, among = free[rows], np.array(places, dtype=np.intp) + start
         inverse = _small_inverse(work[np.ix_(chosen, among)], p)
         turned = product(inverse, work[chosen], p)
         factors = work[:, among].copy()
@@ -99,7 +99,7 @@ def reduced(matrix: Residues, p: int, columns: int | None = None) -> tuple[Resid
         work[chosen] = turned
         is_free[chosen] = False
         pivot_rows += chosen.tolist()
-        pivot_columns += among
+        pivot_columns += among.tolist()
     order = np.argsort(np.array(pivot_columns, dtype=np.intp))
     return work[np.array(pivot_rows, dtype=np.intp)[order]], np.array(pivot_columns, dtype=np.intp)[order]
 
@@ -126,7 +126,7 @@ def characteristic(matrix: Residues, p: int) -> Residues:
             if chain == 0:
                 break
         polynomials[k + 1] = (shifted - product(factors[None], polynomials[: k + 1], p)[0]) % p
-    return polynomials[n][::-1]
+    return np.asarray(polynomials[n][::-1])
 
 
 def common_divisor(first: Residues, second: Residues, p: int) -> Residues:
@@ -136,7 +136,7 @@ def common_divisor(first: Residues, second: Residues, p: int) -> Residues:
         while first.size >= second.size:
             first = first.copy()
             first[: second.size] = (first[: second.size] - first[0] * second) % p
-            first = np.trim_zeros(first, "f")
+            first = np.asarray(np.trim_zeros(first, "f"))
         first, second = second, _monic(first, p)
     return first
 
@@ -155,8 +155,8 @@ def multiplicity(polynomial: Residues, root: int, p: int) -> int:
 
 
 def _monic(polynomial: Residues, p: int) -> Residues:
-    trimmed = np.trim_zeros(polynomial, "f")
-    return trimmed * pow(int(trimmed[0]), -1, p) % p if trimmed.size else trimmed
+    trimmed: Residues = np.asarray(np.trim_zeros(polynomial, "f"))
+    return np.asarray(trimmed * pow(int(trimmed[0]), -1, p) % p) if trimmed.size else trimmed
 
 
 def _pivots(panel: Residues, p: int) -> tuple[list[int], list[int]]:

@@ -1,9 +1,9 @@
 """A matrix polynomial in units in which its eigenvalues and entries are near one, for the oracle.
 
 The unit of time is the geometric mean of the tropical eigenvalues: with the size of the largest product of entries that
-takes one of each row and column, ``det P(s)`` for small s is about ``c_l |s|^l`` and for large s about ``c_h |s|^h``, so
-``(c_l / c_h)^(1 / (h - l))`` is the mean size of its h - l roots. Both products are assignment problems. Unlike scales
-by norms this one does not depend on the units of rows and columns (S. Gaubert and M. Sharify, 2009).
+takes one of each row and column, ``det P(s)`` for small s is about ``c_l |s|^l`` and for large s about ``c_h |s|^h``,
+so ``(c_l / c_h)^(1 / (h - l))`` is the mean size of its h - l roots. Both products are assignment problems. Unlike
+scales by norms this one does not depend on the units of rows and columns (S. Gaubert and M. Sharify, 2009).
 """
 
 from collections.abc import Sequence

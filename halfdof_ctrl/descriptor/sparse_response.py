@@ -9,11 +9,11 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import InterruptedResponseWarning, callers_level
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
-from halfdof_ctrl.descriptor.regularity import require_regular_sparse
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.regularity import require_regular_sparse
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
 
 SUSPECT = 1e10  #: growth of a random solution at the first frequency above which the pencil is tested for regularity
 

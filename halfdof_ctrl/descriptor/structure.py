@@ -15,20 +15,21 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, read_only
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
-from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
-from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.model.singular import causes, null_spaces
-from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS, infinite_part
-from halfdof_ctrl.descriptor.found_structure import found_structure, order_by_size
+from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.exact_counts import normal_rank
+from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
+from halfdof_ctrl.descriptor.found_structure import found_structure, order_by_size
+from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
 from halfdof_ctrl.descriptor.invariant_zeros import invariant_zeros
-from halfdof_ctrl.model.refusals import singular_pencil_error
+from halfdof_ctrl.descriptor.nearness import GENERIC_POINTS, UNDECIDED, share_of_rounding, undecided_regularity
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
 from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.refusals import singular_pencil_error
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import causes, null_spaces
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -191,8 +192,8 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     found = invariant_zeros(system_pencil(model, *every))
     if found.doubts:
         msg = (
-            f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs depend "
-            "on each other but for rounding, or the model is rounded; leave one out by select() and compare."
+            f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs "
+            "depend on each other but for rounding, or the model is rounded; leave one out by select() and compare."
         )
         warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
     return _sorted(found.values)
@@ -220,25 +221,28 @@ def require_regular(model: SecondOrderModel) -> None:
     Raises
     ------
     SingularPencilError
-        ``P(s)`` is singular to working precision at three generic points.
+        ``det P(s)`` of the stored numbers vanishes at every s, exactly.
+    UncertainRankError
+        It does not, but changes of the size of rounding could make it vanish.
     """
     if model.is_sparse:
         require_regular_sparse(model)
         return
-    gamma = typical_frequency(model)
-    P = model.K
-    for point in GENERIC_POINTS:
-        s = gamma * point
-        P = model.K + s * model.C + s**2 * model.M
-        if not _is_singular(P):
-            return
-    null = null_spaces(P)
-    n = len(model.dofs)
+    coefficients = (model.K, model.C, model.M)
+    share = share_of_rounding(coefficients)
+    if share <= UNDECIDED:
+        return
+    n, rank = len(model.dofs), normal_rank(coefficients)
+    s = typical_frequency(model) * GENERIC_POINTS[0]
+    null = null_spaces(model.K + s * model.C + s**2 * model.M)
+    dofs = [model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))]
+    if rank == n:
+        raise undecided_regularity(share, dofs)
     raise singular_pencil_error(
-        dofs=[model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))],
+        dofs=dofs,
         equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
-        fact=f"its rank is {n - null.dimension} of {n}, smallest singular value {null.smallest:.1e} of the largest",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
+        fact=f"its rank is {rank} of {n}",
+        causes=causes(null, coefficients, model.dofs),
     )
 
 
@@ -250,16 +254,3 @@ def typical_frequency(model: SecondOrderModel) -> float:
 def _sorted(values: ComplexArray) -> ComplexArray:
     """Sort by size, conjugate pairs with the positive imaginary part first."""
     return values[order_by_size(values)]
-
-
-def _is_singular(P: Matrix) -> bool:
-    """Tell whether an irreducible diagonal block of a square matrix is singular to working precision."""
-    for rows, columns in diagonal_blocks(P != 0.0):
-        if rows.size != columns.size:
-            return True
-        block = P[np.ix_(rows, columns)]
-        down, across = equilibrating_powers(np.abs(block))
-        values = scipy.linalg.svdvals(block * down[:, None] * across)
-        if values[-1] <= RANK_TOLERANCE * values.size * values[0]:
-            return True
-    return False
