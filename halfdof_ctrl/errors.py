@@ -20,6 +20,7 @@ from halfdof_ctrl.base.errors import (
     SweepInterruptedError,
     NearlyMasslessWarning,
     CloseDecisionWarning,
+    DataLimitWarning,
     LostDigitsWarning,
     FailedCasesWarning,
     ImportedModelWarning,
@@ -27,4 +28,4 @@ from halfdof_ctrl.base.errors import (
     InterruptedResponseWarning,
 )
 
-__all__ = ['CloseDecisionWarning', 'ComplexModelError', 'FailedCasesWarning', 'FileFormatError', 'HalfdofError', 'ImportedModelWarning', 'ImproperError', 'InconsistentStateError', 'InterruptedResponseWarning', 'LostDigitsWarning', 'MatrixError', 'MissingExtraError', 'ModelSizeError', 'NearlyMasslessWarning', 'ParameterError', 'SignalNameError', 'SingularLeadingMatrixError', 'SingularPencilError', 'StabilizationError', 'SweepInterruptedError', 'TruncationWarning', 'UncertainRankError', 'WeightError', 'WorkerError']
+__all__ = ['CloseDecisionWarning', 'ComplexModelError', 'DataLimitWarning', 'FailedCasesWarning', 'FileFormatError', 'HalfdofError', 'ImportedModelWarning', 'ImproperError', 'InconsistentStateError', 'InterruptedResponseWarning', 'LostDigitsWarning', 'MatrixError', 'MissingExtraError', 'ModelSizeError', 'NearlyMasslessWarning', 'ParameterError', 'SignalNameError', 'SingularLeadingMatrixError', 'SingularPencilError', 'StabilizationError', 'SweepInterruptedError', 'TruncationWarning', 'UncertainRankError', 'WeightError', 'WorkerError']

@@ -231,6 +231,10 @@ class LostDigitsWarning(UserWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
+class DataLimitWarning(UserWarning):
+    """Entries known to their last digit do not determine a response to more digits than the message says."""
+
+
 class FailedCasesWarning(UserWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 

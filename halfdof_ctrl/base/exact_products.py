@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
-from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, is_sparse
 
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
@@ -61,9 +61,10 @@ class SlicedMatrix:
 class ExactPolynomial:
     """``R_0 + R_1 s + R_2 s^2`` with coefficients cut for exact products."""
 
-    def __init__(self, coefficients: Sequence[Matrix]) -> None:
+    def __init__(self, coefficients: Sequence[Matrix] | Sequence[SparseMatrix]) -> None:
         self.parts: list[tuple[int, complex, SlicedMatrix]] = []
-        for power, matrix in enumerate(coefficients):
+        for power, coefficient in enumerate(coefficients):
+            matrix: Any = coefficient
             values: Any = as_sparse(matrix) if is_sparse(matrix) else np.asarray(matrix)
             if np.iscomplexobj(values.data if is_sparse(matrix) else values):
                 self.parts += [(power, 1.0, SlicedMatrix.of(values.real)), (power, 1j, SlicedMatrix.of(values.imag))]

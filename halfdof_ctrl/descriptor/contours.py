@@ -1,8 +1,8 @@
 """Counting eigenvalues by circles: the mean of ``(s - c) p'(s)/p(s)`` over a circle, p = det P, for the oracle.
 
 By Cauchy's formula the mean over the circle ``|s - c| = r`` is the number of eigenvalues within; with
-``(s - c)^(k + 1)`` in place of ``s - c`` it is the sum of the k-th powers of their distances from c. The error of m points
-falls as the m-th power of the ratio of r to the distances of the eigenvalues, inner and outer. So the mean is an
+``(s - c)^(k + 1)`` in place of ``s - c`` it is the sum of the k-th powers of their distances from c. The error of m
+points falls as the m-th power of the ratio of r to the distances of the eigenvalues, inner and outer. So the mean is an
 integer where there is a gap, and no integer where there is none: it needs no pencil, no vectors and no rank.
 """
 

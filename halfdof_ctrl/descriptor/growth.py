@@ -80,8 +80,8 @@ def _undecided(model: SecondOrderModel, unclear: npt.NDArray[np.bool_], size: Fl
     ratio = float(size[i, j])
     msg = (
         f"Whether the transfer function from {model.inputs[j]} to {model.outputs[i]} grows with frequency cannot be "
-        f"told: its part that grows is {ratio:.0f} times what rounding of M, C, K lets it be, where {ROUNDED:.0f} times "
-        f"are rounding and {CLEAR:.0f} times are not, and the stored numbers are rounded ones. Give the model in the "
+        f"told: its part that grows is {ratio:.0f} times what rounding of M, C, K lets it be ({ROUNDED:.0f} times "
+        f"are rounding and {CLEAR:.0f} times are not), and the stored numbers are rounded ones. Give the model in the "
         "coordinates in which its constraints are plain numbers, or in units in which its entries are of one size."
     )
     return UncertainRankError(msg, dofs=(model.inputs[j], model.outputs[i]), gap=ratio)

@@ -11,7 +11,9 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import InterruptedResponseWarning, callers_level
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.data_limit import warn_of_data
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
+from halfdof_ctrl.model.refinement import DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
 
@@ -49,6 +51,8 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
     -----
     InterruptedResponseWarning
         Not all frequencies were done.
+    DataLimitWarning
+        Entries known to their last digit do not determine it to 1e-6 of its value.
     """
     p, m = model.D.shape
     require_room(p, m, frequencies.size)
@@ -59,12 +63,14 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
         (model.D, model.Dv, model.Da),
     )
     values = np.empty((p, m, frequencies.size), dtype=np.complex128)
+    limit = DataLimit.none(values.shape)
     done = np.zeros(frequencies.size, dtype=bool)
     try:
         for index in progress(coarse_to_fine(frequencies.size), "frequencies"):
             values[:, :, index] = transfer.at(1j * frequencies[index])
             if transfer.growth > SUSPECT and not done.any():
                 require_regular_sparse(model)
+            limit.data[:, :, index], limit.slope[:, :, index] = transfer.limit.data, transfer.limit.slope
             done[index] = True
     except KeyboardInterrupt:
         if not done.any():
@@ -74,7 +80,9 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
             "that are done, spread over the whole range."
         )
         warnings.warn(msg, InterruptedResponseWarning, stacklevel=callers_level())
-        return values[:, :, done], frequencies[done]
+        values, frequencies = values[:, :, done], frequencies[done]
+        limit = DataLimit(limit.data[:, :, done], limit.slope[:, :, done])
+    warn_of_data(model, frequencies, values, limit, frequencies.size)
     return values, frequencies
 
 

@@ -1,7 +1,10 @@
 """Evaluate equation (1), ``F(s) P(s)^-1 B(s) + D(s)``, by a direct solve at each point.
 
 Each ``P(s)`` is equilibrated by powers of two (which rounds nothing), factorized with partial pivoting,
-and its solution is corrected once where the componentwise backward error is above rounding.
+and its solution is corrected once where the componentwise backward error is above rounding. Where the solution of a
+random right-hand side, which is solved beside the others, shows that P(s) is nearly singular, the sum
+``K + s C + s^2 M`` itself has lost digits: there the solution is refined with residuals summed term by term in twice
+the working precision (`exact_products`).
 """
 
 from collections.abc import Sequence
@@ -9,14 +12,18 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg.lapack import zgetrf, zgetrs
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
+from halfdof_ctrl.model.refinement import DataLimit, random_right_side, refined
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
+SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
 BACKWARD_ERROR = 64 * np.finfo(float).eps  #: componentwise; above it a solution is corrected once
 
 
@@ -39,16 +46,70 @@ def quadratic_transfer(
     """
     if is_sparse(P[0]):
         return sparse_transfer(P, B, F, D, points)
-    values = np.empty((*D[0].shape, points.size), dtype=np.complex128)
+    return transfer_and_growth(P, B, F, D, points)[0]
+
+
+def transfer_and_growth(
+    P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray
+) -> tuple[ComplexArray, FloatArray]:
+    """Evaluate as `quadratic_transfer` does, dense matrices, and tell how nearly singular P(s) is at every point.
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+    (k,) ndarray
+        Size of ``P(s)^-1 r`` for a random r of size one, in the units in which rows and columns of P(s) are even.
+    """
+    values, growth = np.empty((*D[0].shape, points.size), dtype=np.complex128), np.zeros(points.size)
     batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
+    exact: ExactPolynomial | None = None
     for start in range(0, points.size, batch):
         part = points[start : start + batch]
         with np.errstate(invalid="ignore", over="ignore"):
-            states = _solved(_polynomial(P, part), _polynomial(B, part))
+            right = _polynomial(B, part)
+            states, growth[start : start + batch] = _solved(_polynomial(P, part), right)
+            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT).tolist():
+                exact = ExactPolynomial(P) if exact is None else exact
+                states[k] = _refined(P, exact, complex(part[k]), states[k], right[k])
             response = _polynomial(F, part) @ states + _polynomial(D, part)
         response[~np.isfinite(states).all(axis=(1, 2))] = complex(np.inf, np.nan)
         values[:, :, start : start + batch] = np.moveaxis(response, 0, 2)
-    return values
+    return values, growth
+
+
+def data_limit(P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray) -> DataLimit:
+    """Return (DATA) and the slope ``|s dH/ds|`` of dense models at every point, (p, m, k)."""
+    data = quadratic_rounding(P, B, F, D, points)
+    slope = np.empty(data.shape)
+    batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
+    for start in range(0, points.size, batch):
+        part = points[start : start + batch]
+        matrix, output = _polynomial(P, part), _polynomial(F, part)
+        dP, dB, dF, dD = (_polynomial([X[1], 2.0 * X[2]], part) for X in (P, B, F, D))
+        with np.errstate(invalid="ignore", over="ignore"):
+            x = _solved(matrix, _polynomial(B, part))[0]
+            y = np.swapaxes(_solved(np.swapaxes(matrix, 1, 2), np.swapaxes(output, 1, 2))[0], 1, 2)
+            change = dF @ x + y @ (dB - dP @ x) + dD
+        slope[:, :, start : start + batch] = np.abs(np.moveaxis(change, 0, 2) * part)
+    return DataLimit(data, slope)
+
+
+def _refined(
+    P: Coefficients, exact: ExactPolynomial, s: complex, states: ComplexArray, right: ComplexArray
+) -> ComplexArray:
+    """Refine the solution at one point by residuals that are exact but for one rounding."""
+    if not np.isfinite(states).all():
+        return states
+    matrix = _polynomial(P, np.array([s]))
+    rows, columns = _equilibrating_powers(matrix)
+    lu, pivots, info = zgetrf((matrix * rows * columns)[0])
+    if info != 0:
+        return states
+
+    def solve(residual: ComplexArray) -> ComplexArray:
+        return np.asarray(zgetrs(lu, pivots, residual * rows[0])[0] * columns[0].T)
+
+    return refined(exact, s, states, right, solve)
 
 
 def quadratic_rounding(
@@ -96,7 +157,7 @@ def quadratic_rounding(
 def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
     """Give the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
     columns = _equilibrating_powers(P)[1]
-    size = np.abs(_solved(P, B)) / np.swapaxes(columns, 1, 2)
+    size = np.abs(_solved(P, B)[0]) / np.swapaxes(columns, 1, 2)
     return np.asarray((size + np.finfo(float).eps * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
 
 
@@ -139,18 +200,20 @@ def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArra
     return values
 
 
-def _solved(P: ComplexArray, B: ComplexArray) -> ComplexArray:
-    """Solve ``P x = B`` for a stack of matrices, equilibrated."""
+def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+    """Solve ``P x = B`` for a stack of matrices, equilibrated; give the growth of a random right-hand side too."""
     rows, columns = _equilibrating_powers(P)
-    scaled, right = P * rows * columns, B * rows
+    probe = np.broadcast_to(random_right_side(P.shape[1])[:, None], (*P.shape[:2], 1))
+    scaled, right = P * rows * columns, np.concatenate([B * rows, probe], axis=2)
     solution = _solve_each(scaled, right)
     residual = right - scaled @ solution
     size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
     coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
     if coarse.any():
         solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
+    growth = np.abs(solution[:, :, -1]).max(axis=1, initial=0.0)
     solution *= np.swapaxes(columns, 1, 2)
-    return solution
+    return solution[:, :, :-1], np.where(np.isfinite(growth), growth, np.inf)
 
 
 def _equilibrating_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:

@@ -4,12 +4,14 @@ The coefficients of P(s) are put on one pattern. At the first point SuperLU orde
 pattern is nearly symmetric by minimum degree of ``P + P^T``, with pivots on the diagonal, else by columns with partial
 pivoting. All points after it are factorized in that order. Pivots on the diagonal are safe as long as they do not
 vanish; whether they did is seen from the residual, and a point where it is not small gets stricter pivots.
-Solved is for the inputs, or with the transpose for the outputs, whichever are fewer.
+Solved is for the inputs, or with the transpose for the outputs, whichever are fewer. Where the solution of a random
+right-hand side shows that P(s) is nearly singular, the sum of its terms has lost digits: there solutions are refined
+with residuals summed term by term (`exact_products`), and (DATA) says what the entries determine.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +20,7 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import (
     SparseMatrix,
@@ -27,11 +30,15 @@ from halfdof_ctrl.base.sparse_arrays import (
     times,
 )
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.refinement import DataLimit, refined
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 Pivoting: TypeAlias = tuple[Literal["MMD_AT_PLUS_A", "COLAMD"], float]  #: order, least pivot over the column's largest
 
 WIDTH = 8  #: right-hand sides worked at a time
+MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
+SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
+EPS = float(np.finfo(float).eps)
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
 REFINED = 64 * np.finfo(float).eps  #: componentwise backward error above which a solution is corrected once
 UNSAFE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
@@ -100,11 +107,15 @@ class SparseTransfer:
         pencil = SparsePencil.on_one_pattern(square)
         self.pivotings = PIVOTINGS if pencil.is_nearly_symmetric else PIVOTINGS[-1:]
         self.pencils = [pencil] * len(self.pivotings)  #: in the order found for each way of pivoting
-        self.growth = 0.0  #: of a random solution at the first point, relative to the scaled P(s)
+        self.growth = 0.0  #: of a random solution, relative to the scaled P(s), the largest so far
+        self._limit = DataLimit.none(self.D[0].shape)
+        self.square = square
+        self.exact: ExactPolynomial | None = None  #: made when it is needed
 
     def at(self, s: complex) -> ComplexArray:
         """Evaluate at one point [rad/s]: (p, m)."""
         value = np.full(self.D[0].shape, complex(np.inf, np.nan))
+        self._limit = DataLimit.none(value.shape)
         with np.errstate(all="ignore"):
             B, F, D = (_polynomial(part, s) for part in (self.B, self.F, self.D))
             for way in range(len(self.pivotings)):
@@ -122,10 +133,21 @@ class SparseTransfer:
     def _times_solution(self, F: SparseMatrix, B: SparseMatrix, s: complex, way: int) -> tuple[ComplexArray, float]:
         """Give ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
         factors = self._factorized(s, way)
+        growth = factors.growth()
+        self.growth = max(self.growth, growth)
+        left = None
+        if growth > SUSPECT:
+            self.exact = ExactPolynomial(self.square) if self.exact is None else self.exact
+            left = factors.solve_transposed(F[:MOST_BOUNDED].toarray().T)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
         for start in range(0, B.shape[1], WIDTH):
-            solution, backward_error = factors.solve(B[:, start : start + WIDTH].toarray())
+            right = B[:, start : start + WIDTH].toarray()
+            solution, backward_error = factors.solve(right)
+            if left is not None and self.exact is not None:
+                right = np.asarray(right, dtype=np.complex128)
+                solution = refined(self.exact, s, solution, right, lambda residual: factors.solve(residual)[0])
+                self._bound(s, left, solution, start)
             product[:, start : start + WIDTH] = times(F, solution)
             worst = max(worst, backward_error)
         return product, worst
@@ -137,8 +159,21 @@ class SparseTransfer:
         if not pencil.is_ordered:
             order = np.argsort(factors.lu.perm_c)
             self.pencils[way] = pencil.in_order(None if ordering == "COLAMD" else order, order)
-            self.growth = max(self.growth, factors.growth())
         return factors
+
+    @property
+    def limit(self) -> DataLimit:
+        """(p, m) of the last point; zero where P(s) was far from singular."""
+        limit = self._limit
+        return DataLimit(limit.data.T, limit.slope.T) if self.turned else limit
+
+    def _bound(self, s: complex, left: ComplexArray, solution: ComplexArray, start: int) -> None:
+        """Bound what rounding of the entries changes, for some columns."""
+        sizes = _polynomial([csc_array(abs(part)) for part in self.square], abs(s))
+        slope = _polynomial([self.square[1], 2.0 * self.square[2]], s)
+        place = (slice(left.shape[1]), slice(start, start + solution.shape[1]))
+        self._limit.data[place] = EPS * (np.abs(left).T @ times(sizes, np.abs(solution)))
+        self._limit.slope[place] = np.abs(s * (left.T @ times(slope, solution)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -251,6 +286,18 @@ class PointFactors:
         back = np.empty_like(solution)
         back[columns] = solution
         return back, backward_error
+
+    def solve_transposed(self, right: Matrix) -> ComplexArray:
+        """Give ``P(s)^-T right`` for an (n, k) array."""
+        rows, columns = self.pencil.rows, self.pencil.columns
+        scaled = np.asarray((right if columns is None else right[columns]) * self.across, dtype=np.complex128)
+        solution: Any = cast("Any", self.lu).solve(scaled, trans="T")
+        solution *= self.down
+        if rows is None:
+            return np.asarray(solution)
+        back = np.empty_like(solution)
+        back[rows] = solution
+        return np.asarray(back)
 
     def growth(self) -> float:
         """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""

@@ -25,6 +25,7 @@ from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric,
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.base.sparse_arrays import as_sparse
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
 from halfdof_ctrl.systems.state_space import mech2ss
@@ -73,6 +74,9 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     -----
     InterruptedResponseWarning
         The user stopped it.
+    DataLimitWarning
+        Entries known to their last digit do not determine the response to 1e-6 of its value; the message names the
+        frequency where it is worst.
 
     Examples
     --------
@@ -86,7 +90,7 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     else:
         require_regular(model)
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
-        values = model(1j * frequencies, squeeze=False)
+        values = dense_frequency_response(model, frequencies)
     name = None if model.name is None else control_label(model.name)
     return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
 

@@ -1,0 +1,78 @@
+"""Refine a solution of ``P(s) x = b`` by residuals that are summed term by term, dense or sparse alike.
+
+What a refined solution is exact for are the stored entries. What these determine is another matter: with x and y the
+solutions for input and output, relative errors of eps in each entry change the response by
+
+    eps |y|^T (|K| + |s| |C| + |s|^2 |M|) |x|                                              (DATA)
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.exact_products import ExactPolynomial
+
+ROUNDS = 8  #: of refinement at most
+ENOUGH = 4 * float(np.finfo(float).eps)  #: a correction below this part of the largest unknown is the last
+SHRINKS = 0.7  #: corrections that do not shrink by this factor lead nowhere: P(s) is singular to rounding
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DataLimit:
+    """How far rounding of the entries moves a response, and how fast it changes with frequency."""
+
+    data: FloatArray  #: (DATA), of all channels at one point or at many
+    slope: FloatArray  #: size of ``s dH/ds``
+
+    @classmethod
+    def none(cls, shape: tuple[int, ...]) -> "DataLimit":
+        """Start from nothing."""
+        return cls(np.zeros(shape), np.zeros(shape))
+
+
+def refined(
+    exact: ExactPolynomial,
+    s: complex,
+    solution: ComplexArray,
+    right: ComplexArray,
+    solve: Callable[[ComplexArray], ComplexArray],
+) -> ComplexArray:
+    """Refine until corrections no longer shrink.
+
+    Parameters
+    ----------
+    exact : ExactPolynomial
+        P(s).
+    s : complex
+    solution : (n, m) complex ndarray
+        A first one.
+    right : (n, m) complex ndarray
+    solve : callable
+        Takes residuals to corrections, by factors of the rounded sum of the terms.
+
+    Returns
+    -------
+    (n, m) complex ndarray
+        The first solution where corrections do not shrink.
+    """
+    best, last = solution, np.inf
+    for _ in range(ROUNDS):
+        correction = solve(exact.residual(s, best, right))
+        size = np.abs(best).max(axis=0, initial=0.0)
+        share = float((np.abs(correction).max(axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
+        if not share <= SHRINKS * last or not np.isfinite(share):
+            break
+        if share > 1.0:  # more wrong than right: another start is not worth more
+            return solution
+        best, last = best + correction, share
+        if share <= ENOUGH:
+            break
+    return best
+
+
+def random_right_side(size: int) -> FloatArray:
+    """Return a right-hand side of size one that knows nothing of the model, the same at every call."""
+    generator = np.random.default_rng(0)
+    return np.asarray(generator.uniform(0.5, 1.0, size) * generator.choice([-1.0, 1.0], size))
