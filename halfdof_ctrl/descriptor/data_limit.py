@@ -66,11 +66,12 @@ def warn_of_data(
     i, j, k = np.unravel_index(int(np.argmax(share)), share.shape)
     worst, count = float(share[i, j, k]), int(np.count_nonzero((share > WARNED).any(axis=(0, 1))))
     digits = f"to {worst:.1e} of its value" if worst < 1.0 else "not at all"
+    channel = f"{model.outputs[i]} to {model.inputs[j]}"
     msg = (
-        f"Entries of M, C, K known to their last digit (2.2e-16) determine the response of {model.outputs[i]} to "
-        f"{model.inputs[j]} at {frequencies[k]:.4g} rad/s {digits} ((DATA), an upper bound; above 1e-6 at {count} "
-        f"of {asked} frequencies). Small masses or springs were lost beside stiff ones when the entries were rounded, and "
-        "every solver that sees these numbers errs alike. Solutions are refined for the numbers as stored; for "
-        "more digits use fewer elements, or take out what is stiff as a rigid connection."
+        f"Entries of M, C, K known to their last digit (2.2e-16) determine the response of {channel} at "
+        f"{frequencies[k]:.4g} rad/s {digits} ((DATA), an upper bound; above 1e-6 at {count} of {asked} frequencies). "
+        "Small masses or springs were lost beside stiff ones when the entries were rounded, and every solver that sees "
+        "these numbers errs alike. Solutions are refined for the numbers as they are stored; for more digits use fewer "
+        "elements, or take out what is stiff as a rigid connection."
     )
     warnings.warn(msg, DataLimitWarning, stacklevel=callers_level())
