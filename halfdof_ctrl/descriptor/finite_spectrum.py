@@ -21,14 +21,14 @@ from halfdof_ctrl.descriptor.contours import contour
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.groups import Listed, separated
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.quotients import KNOWN, Estimates, eigenvalue_estimates
+from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
 from halfdof_ctrl.descriptor.residues import PRIMES
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
 OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
 TINY = 1e-3  #: in the unit of a polynomial: estimates below may stand for zeros where nothing else is known
-FAINT = 1e-4  #: relative bound above which an eigenvalue far above all others stands for an infinite one
-FAR_ABOVE = 100.0  #: ratio to the next smaller one
+FAINT = 1e-4  #: relative bound above which an eigenvalue far from all others stands for zero or infinity
+FAR = 100.0  #: ratio to the next one
 PLACES = (
     0.5,
     0.75,
@@ -115,6 +115,8 @@ def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
     missing = counts.degree - found.zeros
     if int(weights[known].sum()) != missing:
         within = _within_gap(polynomial, estimates, near, weights, counts.degree)
+        if within is None:
+            within = _within_circle(polynomial, estimates, known, near, weights, found.zeros)
         known = known if within is None else within
     others = estimates.values[~known & ~near]
     found.listed = separated(polynomial, estimates, known, others, has_zeros=found.zeros > 0)
@@ -144,26 +146,31 @@ def _weights(polynomial: ScaledPolynomial, estimates: Estimates) -> npt.NDArray[
 
 
 def _is_told(estimates: Estimates) -> npt.NDArray[np.bool_]:
-    """Tell which estimates are known, but for those that parts of some hundred roundings make far above all others.
+    """Tell which estimates are known, but for those that parts of some hundred roundings make far from all others.
 
-    A product of matrices rounds by tens of eps, which the entries of the result do not show.
+    A product of matrices rounds by tens of eps, which the entries of the result do not show. So what such parts could
+    make of an infinite eigenvalue, far above the others, or of one at the origin, far below, is not told from rounding.
     """
     told = estimates.is_known
     places = np.flatnonzero(told)
     size, bounds = np.abs(estimates.values[places]), estimates.bounds[places]
     clear = np.flatnonzero(bounds <= FAINT * size)
-    first = int(clear[-1]) + 1 if clear.size else places.size
-    if 0 < first < places.size and size[first] > FAR_ABOVE * size[first - 1]:
-        told[places[first:]] = False
+    if clear.size == 0:
+        return told
+    first, last = int(clear[0]), int(clear[-1])
+    if last + 1 < places.size and size[last + 1] > FAR * size[last]:
+        told[places[last + 1 :]] = False
+    if first > 0 and size[first] > FAR * size[first - 1]:
+        told[places[:first]] = False
     return told
 
 
 def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArray[np.bool_]:
     """Tell which estimates stand for eigenvalues at the origin: below all known ones, and not told from zero."""
     size = np.abs(estimates.values)
-    known = np.flatnonzero(estimates.is_known)
+    known = np.flatnonzero(_is_told(estimates))
     below = np.arange(size.size) < known[0] if known.size else size <= TINY
-    near = below & ~(estimates.bounds <= KNOWN * size)  # bounds may be nan where all is zero
+    near = below & ~(estimates.bounds <= FAINT * size)  # bounds may be nan where all is zero
     total = 0
     for k, value in enumerate(estimates.values):
         if total >= exact:
@@ -216,6 +223,24 @@ def _within_gap(
     if not 0.0 < radius < np.inf or contour(polynomial, 0.0, radius).count != degree:
         return None
     return np.asarray((np.arange(size.size) <= place[0]) & ~near)
+
+
+def _within_circle(
+    polynomial: ScaledPolynomial,
+    estimates: Estimates,
+    known: npt.NDArray[np.bool_],
+    near: npt.NDArray[np.bool_],
+    weights: npt.NDArray[np.int64],
+    zeros: int,
+) -> npt.NDArray[np.bool_] | None:
+    """Take all estimates in a circle around the known ones, if they are as many as it holds; None otherwise."""
+    size = np.abs(estimates.values)
+    radius = OUTSIDE * float(size[known].max(initial=0.0))
+    inside = (size < radius) & ~near
+    if int(weights[inside].sum()) == int(weights[known].sum()):
+        return None
+    count = contour(polynomial, 0.0, radius).count
+    return inside if count == zeros + int(weights[inside].sum()) else None
 
 
 def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) -> None:

@@ -22,7 +22,7 @@ from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil, time_scale
 from halfdof_ctrl.descriptor.found_structure import found_structure, order_by_size
 from halfdof_ctrl.descriptor.growth import improper_pairs, system_pencil
-from halfdof_ctrl.descriptor.invariant_zeros import invariant_zeros
+from halfdof_ctrl.descriptor.minors import invariant_zeros
 from halfdof_ctrl.descriptor.nearness import GENERIC_POINTS, UNDECIDED, share_of_rounding, undecided_regularity
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
 from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
