@@ -74,6 +74,8 @@ class ExactPolynomial:
     def residual(self, s: complex | ComplexArray, x: ComplexArray, right: ComplexArray | float = 0.0) -> ComplexArray:
         """Return ``right - P(s) x``, summed in twice the working precision and rounded once.
 
+        Twice as precise as the largest entry of a row times the largest of x, not as each product.
+
         Parameters
         ----------
         s : complex or (k,) complex ndarray

@@ -248,8 +248,9 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
     total = found.zeros + found.listed.values.size
     largest = float(np.abs(found.listed.values).max(initial=0.0))
     if found.zeros > counts.at_origin:
+        more = found.zeros - counts.at_origin
         found.doubts.append(
-            f"{found.zeros - counts.at_origin} of {counts.degree} eigenvalues are within "
+            f"{more} of {counts.degree} eigenvalues {'is' if more == 1 else 'are'} within "
             f"{found.radius * polynomial.unit:.2g} rad/s of the origin and not told from zero: free bodies in rounded "
             "numbers have such eigenvalues instead of zeros"
         )
@@ -257,10 +258,11 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
         within = contour(polynomial, 0.0, OUTSIDE * largest).count if largest > 0.0 else None
         told = f"{total} eigenvalues are told from rounding, up to {largest * polynomial.unit:.3g} rad/s"
         if within == total:
+            more = counts.degree - total
             found.doubts.append(
-                f"{told}, and a circle around them holds as many, but the stored numbers have {counts.degree}: "
-                f"{counts.degree - total} of them are so large that parts of the size of rounding make them, which an "
-                "exact model would have at infinity"
+                f"{told}, and a circle around them holds as many, but the stored numbers have {counts.degree}: {more} of "
+                f"them {'is' if more == 1 else 'are'} so large that parts of the size of rounding make "
+                f"{'it' if more == 1 else 'them'}, which an exact model would have at infinity"
             )
         else:
             around = "no whole number" if within is None else f"{within}"

@@ -1,0 +1,59 @@
+"""Warnings of responses that the entries of a model do not determine."""
+
+import warnings
+
+import numpy as np
+import pytest
+from hypothesis import given
+from numpy.testing import assert_allclose
+from structures import Structure, damped_structures
+from support.slender_beam import slender_beam, tip_receptance
+
+from halfdof_ctrl import descriptor_response, mechss
+from halfdof_ctrl.base.errors import DataLimitWarning
+
+OMEGA = np.array([0.5, 1.0, 5.0, 10.0])  # rad/s, away from the resonances at 2.6 and 16.4
+DISCRETIZED = 1e-6  # relative: 3000 elements
+FEW = 1e-4  # relative: 250 elements
+
+
+def test_beam_of_thousands_of_elements_is_refined_and_announced() -> None:
+    """Without refinement its error is some percent; (DATA) says so, and names the frequency."""
+    with pytest.warns(DataLimitWarning, match=r"determine the response of q5998 to F_q5998 at 1 rad/s.*upper bound"):
+        found = descriptor_response(slender_beam(3000, is_sparse=True), OMEGA).complex
+    assert_allclose(found, [tip_receptance(omega) for omega in OMEGA.tolist()], rtol=DISCRETIZED)
+
+
+def test_dense_and_sparse_beams_have_one_response_and_one_limit() -> None:
+    """250 elements, by either method, to the last digits; both warn."""
+    responses = []
+    for is_sparse in (False, True):
+        with pytest.warns(DataLimitWarning, match="Small masses or springs were lost beside stiff ones"):
+            responses.append(descriptor_response(slender_beam(250, is_sparse=is_sparse), OMEGA).complex)
+    assert_allclose(responses[0], responses[1], rtol=1e-13)
+    assert_allclose(responses[0], [tip_receptance(omega) for omega in OMEGA.tolist()], rtol=FEW)
+
+
+@pytest.mark.parametrize("is_sparse", [False, True])
+def test_short_beam_is_left_alone(*, is_sparse: bool) -> None:
+    """20 elements lose no more than 1e-9: no warning, on the resonance of the undamped beam neither."""
+    omega = np.array([1.0, 2.6218453147])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        descriptor_response(slender_beam(20, is_sparse=is_sparse), omega)
+
+
+def test_undamped_resonance_is_no_loss() -> None:
+    """At 2 rad/s and a millionth beside it: a change of the frequency in its last digits makes the difference."""
+    oscillators = mechss(np.eye(2), None, [[5.0, -1.0], [-1.0, 5.0]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        descriptor_response(oscillators, [2.0 * (1.0 + 1e-12), 2.0 * (1.0 + 1e-6)])
+
+
+@given(structure=damped_structures())
+def test_ordinary_structures_raise_no_warning(structure: Structure) -> None:
+    """Small integers with all kinds of DOFs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        descriptor_response(structure.model(), np.geomspace(1e-2, 1e2, 20))
