@@ -1,7 +1,7 @@
 """The oracle: what the descriptor form itself says, by routes that the reduction does not take.
 
-The eigenvalues come from the first-order pencil (8) in q and as many velocities as M has rank (`quadratics`), deflated
-to its finite part (`pencils`). Zeros are the finite eigenvalues of the system pencil
+Counts are exact (`exact_counts`), eigenvalues carry bounds (`finite_spectrum`), and what rounding left open is said
+(`found_structure`). Zeros are the finite eigenvalues of the system pencil
 
     [ P(s)  -B(s) ]
     [ F(s)   D(s) ]                                                                        (9)
@@ -97,6 +97,12 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
 
     Notes
     -----
+    Counts are those of the stored numbers, exactly (`exact_counts`); eigenvalues are those of QZ made sharper, each with
+    the bound (33) of what rounding of the entries may have moved it, and the list is proved (`finite_spectrum`). Where
+    numbers were rounded before they were stored, by a change of coordinates or to decimals, they may have eigenvalues
+    that nobody meant. Those that are told from rounding are given, `most_finite` is what the stored numbers have, and
+    `uncertainty` says what is in doubt.
+
     The pencil (8) of dimension n + rank M has ``n + rank M - k`` eigenvalues at infinity beside the k finite ones, in
     Jordan blocks whose sizes are `infinite_blocks`: a block of size 1 is an algebraic equation that holds at once (a
     static DOF), one of size 2 takes a derivative (a velocity constraint with its multiplier), one of size 3 two (a
@@ -169,8 +175,9 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
 
     Notes
     -----
-    Deflation removes what the pencil has at infinity and what it has too much of rows and of columns (P. Van Dooren,
-    1979). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
+    Their number is exact for the stored numbers, and their values are refined as those of `pencil_structure` are. For
+    other numbers of outputs than inputs, and for dependent ones, zeros are what two random combinations of the largest
+    minors have in common (`minors`). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
     zeros of the rank that is left.
 
     Examples
