@@ -24,6 +24,7 @@ from halfdof_ctrl.descriptor.patterns import diagonal_blocks
 from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
 from halfdof_ctrl.descriptor.residues import PRIMES
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
+from halfdof_ctrl.descriptor.unit_ranges import over_more_decades
 
 OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
 TINY = 1e-3  #: in the unit of a polynomial: estimates below may stand for zeros where nothing else is known
@@ -103,6 +104,8 @@ def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
     if counts.degree == counts.at_origin:
         return _Findings(Listed.none(), zeros=counts.degree)
     estimates = eigenvalue_estimates(polynomial)
+    if int(_weights(polynomial, estimates)[estimates.is_known].sum()) + counts.at_origin != counts.degree:
+        estimates = over_more_decades(polynomial, estimates)
     near = _near_zero(estimates, counts.at_origin, is_real=polynomial.is_real)
     known = _is_told(estimates) & ~near
     weights = _weights(polynomial, estimates)
@@ -260,8 +263,8 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
         if within == total:
             more = counts.degree - total
             found.doubts.append(
-                f"{told}, and a circle around them holds as many, but the stored numbers have {counts.degree}: {more} of "
-                f"them {'is' if more == 1 else 'are'} so large that parts of the size of rounding make "
+                f"{told}, and a circle around them holds as many, but the stored numbers have {counts.degree}: {more} "
+                f"of them {'is' if more == 1 else 'are'} so large that parts of the size of rounding make "
                 f"{'it' if more == 1 else 'them'}, which an exact model would have at infinity"
             )
         else:

@@ -34,7 +34,7 @@ class FirstOrderPencil:
 def first_order_pencil(coefficients: Sequence[Matrix]) -> FirstOrderPencil:
     """Write ``R_0 + R_1 s + R_2 s^2`` as the pencil (8), square or not."""
     scale = time_scale(coefficients)
-    R0, R1, R2 = (matrix * scale**power for power, matrix in enumerate(coefficients))
+    R0, R1, R2 = coefficients[0], coefficients[1] * scale, coefficients[2] * scale * scale  # scale^2 may overflow
     rows, columns = balancing_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
     R0, R1, R2 = (matrix * rows[:, None] * columns for matrix in (R0, R1, R2))
     left, right = _low_rank_factors(R2)
@@ -87,4 +87,4 @@ def _balances(sizes: FloatArray) -> FloatArray:
     sizes, present = sizes[:, several], present[:, several]
     low, high = present.argmax(axis=0), len(sizes) - 1 - present[::-1].argmax(axis=0)
     every = np.arange(sizes.shape[1])
-    return np.asarray(np.log2(sizes[low, every] / sizes[high, every]) / (high - low))
+    return np.asarray((np.log2(sizes[low, every]) - np.log2(sizes[high, every])) / (high - low))

@@ -27,6 +27,7 @@ class FoundStructure:
     doubts: tuple[str, ...]
 
 
+@np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
 def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
     """Find counts, eigenvalues and doubts of a square matrix polynomial, of 1, s, s^2."""
     if not coefficients[0].size:

@@ -38,6 +38,7 @@ class Zeros:
     doubts: tuple[str, ...]  #: what is uncertain, in words
 
 
+@np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
 def invariant_zeros(coefficients: Sequence[Matrix]) -> Zeros:
     """Find the roots of the greatest common divisor of the largest minors that do not all vanish.
 
@@ -93,7 +94,8 @@ def _combined(coefficients: Sequence[Matrix], rank: int, seed: int) -> list[Matr
     """Add random multiples of the last rows and columns to the first, which leaves a square polynomial."""
     generator = np.random.default_rng(seed)
     unit = mean_frequency(_squared(coefficients))
-    size = np.max([np.abs(part) * unit**power for power, part in enumerate(coefficients)], axis=0)
+    R0, R1, R2 = (np.abs(part) for part in coefficients)
+    size = np.maximum(np.maximum(R0, R1 * unit), R2 * unit * unit)
     rows, columns = balancing_powers(size)
     parts = [part * rows[:, None] * columns for part in coefficients]
     more_rows, more_columns = parts[0].shape[0] - rank, parts[0].shape[1] - rank

@@ -24,6 +24,7 @@ ITERATIONS = 12  #: of the power method, for a factor that need not be known wel
 UNDECIDED = 1e-2  #: a share of rounding above may hide that a model is singular: products round by tens of eps
 
 
+@np.errstate(all="ignore")  # numbers near the largest and the smallest doubles
 def share_of_rounding(coefficients: Sequence[Matrix]) -> float:
     """Return ``eps rho`` of (34), the least over a few points: below one, no rounding of the entries makes P singular.
 

@@ -31,11 +31,16 @@ class ScaledPolynomial:
     @classmethod
     def of(cls, coefficients: Sequence[Matrix]) -> "ScaledPolynomial":
         """Scale by powers of two, which rounds nothing."""
-        unit = mean_frequency(coefficients)
-        R0, R1, R2 = (part * unit**power for power, part in enumerate(coefficients))
+        R0, R1, R2 = coefficients
+        return cls((R0, R1, R2), 1.0).in_unit(mean_frequency(coefficients))
+
+    def in_unit(self, unit: float) -> "ScaledPolynomial":
+        """Take another unit of time, relative to this one, and balance rows and columns in it."""
+        R0, R1, R2 = self.coefficients
+        R1, R2 = R1 * unit, R2 * unit * unit  # unit^2 may overflow
         rows, columns = equilibrating_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
         scale = rows[:, None] * columns
-        return cls((R0 * scale, R1 * scale, R2 * scale), unit)
+        return ScaledPolynomial((R0 * scale, R1 * scale, R2 * scale), self.unit * unit)
 
     @property
     def is_real(self) -> bool:
@@ -81,22 +86,25 @@ def mean_frequency(coefficients: Sequence[Matrix]) -> float:
     >>> mean_frequency([rows * np.diag([1.0, 16.0]), np.zeros((2, 2)), rows * np.eye(2)])
     2.0
     """
+    return mean_frequency_between(coefficients, -FAR, FAR)
+
+
+def mean_frequency_between(coefficients: Sequence[Matrix], low: float, high: float) -> float:
+    """Return the geometric mean of the tropical eigenvalues between two binary logarithms, one where there are none."""
     sizes = np.abs(np.stack(list(coefficients)))
-    present = sizes > 0.0
-    logs = np.log2(np.where(present, sizes, 1.0))
-    low = present.argmax(axis=0)
-    high = len(sizes) - 1 - present[::-1].argmax(axis=0)
-    first, last = (_largest_product(logs, present.any(axis=0), power, sign) for power, sign in ((low, -1), (high, 1)))
+    logs = np.where(sizes > 0.0, np.log2(np.where(sizes > 0.0, sizes, 1.0)), -ABSENT)
+    first, last = (_largest_product(logs, at) for at in (low, high))
     roots = last[0] - first[0]
     return float(2.0 ** np.round((first[1] - last[1]) / roots)) if roots > 0 else 1.0
 
 
-def _largest_product(logs: FloatArray, present: Matrix, power: Matrix, sign: int) -> tuple[int, float]:
-    """Return degree and logarithm of the largest product of entries at very small or very large s."""
-    value = np.take_along_axis(logs, power[None], axis=0)[0]
-    weight = np.where(present, sign * FAR * power + value, -ABSENT)
-    rows, columns = scipy.optimize.linear_sum_assignment(weight, maximize=True)
-    return int(power[rows, columns].sum()), float(value[rows, columns].sum())
+def _largest_product(logs: FloatArray, at: float) -> tuple[int, float]:
+    """Return degree and logarithm of the coefficient of the largest product of entries at ``|s| = 2^at``."""
+    terms = logs + at * np.arange(len(logs))[:, None, None]
+    power = terms.argmax(axis=0)
+    rows, columns = scipy.optimize.linear_sum_assignment(terms.max(axis=0), maximize=True)
+    chosen = power[rows, columns]
+    return int(chosen.sum()), float(logs[chosen, rows, columns].sum())
 
 
 def _even(P: ComplexArray) -> FloatArray:

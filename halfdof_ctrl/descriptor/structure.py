@@ -97,8 +97,8 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
 
     Notes
     -----
-    Counts are those of the stored numbers, exactly (`exact_counts`); eigenvalues are those of QZ made sharper, each with
-    the bound (33) of what rounding of the entries may have moved it, and the list is proved (`finite_spectrum`). Where
+    Counts are those of the stored numbers, exactly (`exact_counts`); eigenvalues are those of QZ made sharper, each
+    with the bound (33) of what rounding of the entries may have moved it, and the list is proved (`finite_spectrum`). Where
     numbers were rounded before they were stored, by a change of coordinates or to decimals, they may have eigenvalues
     that nobody meant. Those that are told from rounding are given, `most_finite` is what the stored numbers have, and
     `uncertainty` says what is in doubt.
@@ -177,8 +177,8 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     -----
     Their number is exact for the stored numbers, and their values are refined as those of `pencil_structure` are. For
     other numbers of outputs than inputs, and for dependent ones, zeros are what two random combinations of the largest
-    minors have in common (`minors`). Two outputs together vanish less often than one alone, and a model that does not respond at all has the
-    zeros of the rank that is left.
+    minors have in common (`minors`). Two outputs together vanish less often than one alone, and a model that does not
+    respond at all has the zeros of the rank that is left.
 
     Examples
     --------
