@@ -98,10 +98,10 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     Notes
     -----
     Counts are those of the stored numbers, exactly (`exact_counts`); eigenvalues are those of QZ made sharper, each
-    with the bound (33) of what rounding of the entries may have moved it, and the list is proved (`finite_spectrum`). Where
-    numbers were rounded before they were stored, by a change of coordinates or to decimals, they may have eigenvalues
-    that nobody meant. Those that are told from rounding are given, `most_finite` is what the stored numbers have, and
-    `uncertainty` says what is in doubt.
+    with the bound (33) of what rounding of the entries may have moved it, and the list is proved (`finite_spectrum`).
+    Where numbers were rounded before they were stored, by a change of coordinates or to decimals, they may have
+    eigenvalues that nobody meant. Those that are told from rounding are given, `most_finite` is what the stored numbers
+    have, and `uncertainty` says what is in doubt.
 
     The pencil (8) of dimension n + rank M has ``n + rank M - k`` eigenvalues at infinity beside the k finite ones, in
     Jordan blocks whose sizes are `infinite_blocks`: a block of size 1 is an algebraic equation that holds at once (a
