@@ -26,6 +26,7 @@ html_css_files = ["halfdof.css"]
 html_copy_source = False
 html_show_sourcelink = False
 html_math_renderer = "svg"
+html_search_scorer = str(Path(__file__).parent / "_ext" / "scorer.js")  # public names first
 
 default_role = "py:obj"
 autodoc_typehints = "none"

@@ -32,6 +32,8 @@ HORIZON = 0.5  #: [s] of the step response, which settles at 1
 RTOL, ATOL = 1e-4, 1e-7  #: of every solver
 LIMIT = 20_000  #: evaluations after which a solver is stopped
 TABLED = (1e-2, 1e-3, 1e-4, 1e-6)  #: epsilons that stand in the tables
+SETTLED = 1_000  #: evaluations with which an implicit solver is done, unless it is at an undamped vibration
+CERTAIN = 0.8  #: of such a count, which hangs on rounding, is exceeded on every processor
 ROUNDING = 1e-13  #: below which the tables give no digits of an error
 BAND = 10.0  #: [Hz] up to which the tables give the error of the transfer function, above all natural frequencies
 
@@ -226,9 +228,19 @@ def printed(row: Row) -> str:
         f"{error:.1e}" if error > ROUNDING else f"< {ROUNDING:.0e}"
         for error in (row.eigenvalue_error, row.transfer_error)
     ]
-    work = [f"{count}" if count <= LIMIT else f"> {LIMIT}" for count in row.evaluations]
+    work = [printed_count(solver, count) for solver, count in zip(SOLVERS, row.evaluations, strict=True)]
     cells = [row.name, str(row.states), *errors, *work]
     return f"| {' | '.join(cells)} |"
+
+
+def printed_count(solver: Solver, count: int) -> str:
+    """Write a count, or what it surely exceeds: the limit, or 1, 2 or 5 times a power of ten."""
+    if count > LIMIT:
+        return f"> {LIMIT}"
+    if solver == "RK45" or count <= SETTLED:
+        return f"{count}"
+    decade = 10 ** int(np.log10(CERTAIN * count))
+    return f"> {max(step * decade for step in (1, 2, 5) if step * decade <= CERTAIN * count)}"
 
 
 def reduced_systems(case: Case) -> Iterator[tuple[str, control.StateSpace]]:

@@ -7,68 +7,34 @@ nothing written).
 import argparse
 import functools
 import importlib.metadata
-import inspect
 import io
-import math
 import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import TypeAlias, overload
 
-import control
-import numpy as np
-
-from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
-from halfdof_ctrl.systems.crosscheck import crosscheck
-from halfdof_ctrl.descriptor.structure import pencil_structure
-from halfdof_ctrl.design.lqr import StateFeedback, lqr
-from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, InterruptedResponseWarning, ParameterError
-from halfdof_ctrl.files.models import (
-    GAIN_ENDINGS,
-    TABLE_ENDINGS,
-    inspect_files,
-    load_model,
-    replacing,
-    save_gain,
-    save_response,
-    save_system,
+from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning, own_messages, recording_warnings
+from halfdof_ctrl.commands import (
+    BUILT_IN,
+    REFUSED,
+    WEIGHTS,
+    run_bode,
+    run_check,
+    run_info,
+    run_lqr,
+    run_poles,
+    run_report,
+    run_ss,
+    run_step,
+    run_stiffness,
 )
-from halfdof_ctrl.systems.step_times import relevant_poles, step_times
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.parts.mounts import hydromount
-from halfdof_ctrl.base.names import listed, motions
-from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
-from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.report import check_as_json, default_design, save_figure, without_windows, write_report
-from halfdof_ctrl.systems.frequency import (
-    DEFAULT_POINTS,
-    FEW_POINTS,
-    frequency_response,
-    has_many_states,
-    model_frequencies,
-)
-from halfdof_ctrl.systems.state_space import mech2ss
-from halfdof_ctrl.plots.step import MOST_RECOVERED
-from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
-from halfdof_ctrl.plots.stiffness import Scale
+from halfdof_ctrl.plots.figure_files import without_windows
+from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
+from halfdof_ctrl.systems.state_map import KINDS
 
 PROGRAM = "halfdof-ctrl"
-DONE, CHECK_FAILED, REFUSED = 0, 1, 2
 INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
-_Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
-BUILT_IN = {"hydromount": hydromount}
-BUILT_IN_SIGNALS: dict[str, _Signals] = {
-    "hydromount": (("F_y",), ("y", "y_dot"))
-}  #: what is shown unless the user asks for others
-BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
-LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
-FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
-FIGURE_ENDINGS = (".png", ".svg", ".pdf")
-WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -99,261 +65,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return code
 
 
-def _report(arguments: argparse.Namespace) -> int:
-    report = write_report(_model(arguments), arguments.o)
-    print(report.eigenvalues)
-    print(report.check)
-    for note in report.notes:
-        print(note)
-    print(f"report: {arguments.o}{os.sep}index.html")
-    return DONE if report.passed else CHECK_FAILED
-
-
-def _info(arguments: argparse.Namespace) -> int:
-    if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
-        print(inspect_files(arguments.model), flush=True)
-    model = _model(arguments)
-    print(model)
-    if len(model.dofs) > LARGEST_PENCIL:
-        if not model.is_sparse:
-            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
-            return DONE
-        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
-        model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
-    else:
-        structure = pencil_structure(model)
-        kind = "regular" if structure.is_regular else "SINGULAR"
-        finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
-        print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
-    try:
-        print(exact_reduction(model))
-    except HalfdofError as refusal:
-        print(f"No state space: {refusal}")
-    return DONE
-
-
-def _ss(arguments: argparse.Namespace) -> int:
-    _require_ending(arguments.o, MATRIX_ENDINGS)
-    system = mech2ss(_model(arguments))
-    if arguments.o is None:
-        print(system)
-    else:
-        save_system(system, arguments.o)
-    return DONE
-
-
-def _bode(arguments: argparse.Namespace) -> int:
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
-    model = _model(arguments)
-    usual = FEW_POINTS if has_many_states(model) else DEFAULT_POINTS
-    omega = _frequencies(lambda: model_frequencies(model), arguments, usual=usual)
-    if kind in TABLE_ENDINGS:
-        save_response(frequency_response(model, omega), arguments.o)
-    else:
-        save_figure(bode_plot(model, omega, dB=arguments.db, Hz=arguments.hz, title=model.name), arguments.o)
-    return DONE
-
-
-def _stiffness(arguments: argparse.Namespace) -> int:
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
-    model = _model(arguments)
-    dof = _driven(model, arguments)
-    grid = functools.partial(motion_frequencies, [model], dof, free=True, linear=not arguments.log)
-    omega = _frequencies(grid, arguments, linear=not arguments.log)
-    if kind in TABLE_ENDINGS:
-        save_response(dynamic_stiffness_response(model, dof, grid() if omega is None else omega), arguments.o)
-    else:
-        scale: Scale = "log" if arguments.log else "linear"
-        save_figure(dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale), arguments.o)
-    return DONE
-
-
-def _step(arguments: argparse.Namespace) -> int:
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
-    model = _model(arguments)
-    if kind in TABLE_ENDINGS:
-        recovered = _with_recovered(model)
-        system = mech2ss(recovered)
-        times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
-        save_response(control.step_response(system, times, squeeze=False), arguments.o)
-    else:
-        save_figure(step_plot(model, arguments.time, title=model.name), arguments.o)
-    return DONE
-
-
-def _poles(arguments: argparse.Namespace) -> int:
-    _require_ending(arguments.o, FIGURE_ENDINGS)
-    model = _model(arguments)
-    table = eigenvalue_table(model, mech2ss(model))
-    if arguments.o is not None:
-        save_figure(pole_map_plot(model, title=model.name), arguments.o)
-    print(table)
-    return DONE
-
-
-def _lqr(arguments: argparse.Namespace) -> int:
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *GAIN_ENDINGS))
-    model = _model(arguments)
-    feedback, words = _feedback(model, arguments)
-    if kind in FIGURE_ENDINGS:
-        save_figure(pole_map_plot(model, feedback=feedback, title=model.name), arguments.o)
-    elif kind is not None:
-        save_gain(feedback, arguments.o)
-    if words:
-        print(words)
-    print(feedback)
-    return DONE
-
-
-def _check(arguments: argparse.Namespace) -> int:
-    _require_ending(arguments.o, (".json",))
-    model = _model(arguments)
-    check = crosscheck(model, mech2ss(model))
-    if arguments.o is not None:
-        with replacing(arguments.o) as stream:
-            stream.write(check_as_json(check))
-    print(check)
-    return DONE if check.passed else CHECK_FAILED
-
-
-def _model(arguments: argparse.Namespace) -> SecondOrderModel:
-    """Make the built-in model or load the file, and select its signals."""
-    name: str = arguments.model
-    signals: _Signals | None = None
-    if name in BUILT_IN:
-        signals = BUILT_IN_SIGNALS[name]
-        model = BUILT_IN[name](**_parameters(name, arguments.p))
-    else:
-        if arguments.p:
-            msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN)}); {name} is a file."
-            raise ParameterError(msg, parameter="-p", value=arguments.p)
-        if not Path(name).exists() and Path(name).suffix.lower() not in MATRIX_ENDINGS:
-            msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
-            raise FileFormatError(msg, path=name)
-        model = load_model(name)
-    inputs, outputs = signals or (None, None)
-    return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
-
-
-def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]:
-    """Give the DOFs that are moved: those asked for, that of the built-in model, or the only one."""
-    default = BUILT_IN_DOF.get(arguments.model, model.dofs[0] if len(model.dofs) == 1 else None)
-    if arguments.dof is None and default is None:
-        msg = f"--dof must name the DOF whose dynamic stiffness is meant: {listed(model.dofs)}."
-        raise ParameterError(msg, parameter="--dof", value=None)
-    return _listed(arguments.dof, [str(default)])
-
-
-def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
-    known = list(inspect.signature(BUILT_IN[name]).parameters)
-    parameters = _assignments(given, "-p")
-    for symbol in parameters:
-        if symbol not in known:
-            msg = f"{name} has no parameter {symbol!r}. Known: {', '.join(known)}."
-            raise ParameterError(msg, parameter=symbol, value=parameters[symbol])
-    return parameters
-
-
-def _assignments(given: Sequence[str], option: str) -> dict[str, float]:
-    """Read NAME=VALUE texts."""
-    values: dict[str, float] = {}
-    for text in given:
-        name, _, value = text.rpartition("=")
-        if not name:
-            msg = f"{option} takes a name and a number, NAME=VALUE, not {text!r}."
-            raise ParameterError(msg, parameter=option, value=text)
-        if name in values:
-            msg = f"{option} gives {name} twice."
-            raise ParameterError(msg, parameter=option, value=text)
-        values[name] = _number(value, f"{option} {name}")
-    return values
-
-
-def _number(text: str, what: str) -> float:
-    try:
-        return float(text)
-    except ValueError as cause:
-        msg = f"{what} must be a number, not {text!r}."
-        raise ParameterError(msg, parameter=what, value=text) from cause
-
-
-@overload
-def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]: ...
-
-
-@overload
-def _listed(given: Sequence[str] | None, default: None) -> list[str] | None: ...
-
-
-def _listed(given: Sequence[str] | None, default: Sequence[str] | None) -> list[str] | None:
-    """Split lists with commas; None where nothing is given and there is no default."""
-    if given is None:
-        return None if default is None else list(default)
-    return [name.strip() for text in given for name in text.split(",") if name.strip()]
-
-
-def _frequencies(
-    default: Callable[[], np.ndarray],
-    arguments: argparse.Namespace,
-    *,
-    linear: bool = False,
-    usual: int = DEFAULT_POINTS,
-) -> np.ndarray | None:
-    """Choose the frequencies [rad/s] if any of the limits or their number is given, the others from a default grid."""
-    low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
-    if low is None and high is None and points is None:
-        return None
-    around = default() if low is None or high is None else np.zeros(0)
-    low = around[0] if low is None else low
-    high = around[-1] if high is None else high
-    if not (math.isfinite(high) and 0.0 <= low < high and (linear or low > 0.0)):
-        msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
-        raise ParameterError(msg, parameter="--omega-min", value=low)
-    points = usual if points is None else points
-    if not FEWEST_POINTS <= points <= MOST_POINTS:
-        msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
-        raise ParameterError(msg, parameter="--points", value=points)
-    return np.linspace(low, high, points) if linear else np.geomspace(low, high, points)
-
-
-def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
-    """Add the displacements of DOFs without inertia to the outputs, as the figure shows them."""
-    if model.is_sparse and len(model.dofs) > MOST_RECOVERED:
-        return model
-    part = exact_reduction(model).partition
-    known = motions(model.dofs)
-    extra = [name for name in (*part.half, *part.static) if name in known and name not in model.outputs]
-    return model.select(outputs=[*model.outputs, *extra])
-
-
-def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[StateFeedback, str]:
-    weights = {kind: _assignments(_listed(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
-    if arguments.energy is None and not any(weights.values()):
-        return default_design(model)
-    return lqr(
-        model,
-        displacement=weights["displacement"],
-        velocity=weights["velocity"],
-        acceleration=weights["acceleration"],
-        effort=weights["effort"],
-        energy=arguments.energy,
-    ), ""
-
-
-def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
-    """Refuse an ending before anything is computed."""
-    return None if path is None else ending(path, known)
-
-
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
-    """Show each warning once, as a line."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    """Show each of the package's warnings once, as a line."""
+    with recording_warnings() as caught:
         try:
             yield caught
         finally:
-            for message in dict.fromkeys(str(warning.message) for warning in caught):
+            for message in own_messages(caught):
                 _say("warning", message)
 
 
@@ -372,26 +91,34 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
     add = functools.partial(_add_command, commands)
-    add("report", _report, "write a page, figures, the state space and the check into a folder", "FOLDER", needed=True)
-    add("info", _info, "print what is in the files, the model, its pencil and its reduction", None)
-    add("ss", _ss, "print the state space, or write it (npz, mat)", "FILE")
-    bode = add("bode", _bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    add(
+        "report",
+        run_report,
+        "write a page, figures, the state space and the check into a folder",
+        "FOLDER",
+        needed=True,
+    )
+    add("info", run_info, "print what is in the files, the model, its pencil and its reduction", None)
+    ss = add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
+    ss.add_argument("--states", choices=KINDS, default="dofs", help="what the states are (default: dofs)")
+    bode = add("bode", run_bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
     bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
-    step = add("step", _step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    step = add("step", run_step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
+    step.add_argument("--amplitude", type=float, default=1.0, metavar="A", help="of the step, of a nonlinear model")
     step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
-    add("poles", _poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
+    add("poles", run_poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
     what = "write the dynamic stiffness at a DOF and its loss angle over Hz (png, svg, pdf), or the numbers (csv)"
-    stiffness = add("stiffness", _stiffness, what, "FILE", needed=True, signals=False)
+    stiffness = add("stiffness", run_stiffness, what, "FILE", needed=True, signals=False)
     stiffness.add_argument("--dof", action="append", metavar="A,B", help="DOF that is moved; several move together")
     _add_frequencies(stiffness)
     stiffness.add_argument("--log", action="store_true", help="logarithmic axes and frequencies instead of linear ones")
-    regulator = add("lqr", _lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
+    regulator = add("lqr", run_lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
     for kind in WEIGHTS:
         regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
     regulator.add_argument("--energy", type=float, metavar="W", help="weight of the mechanical energy [1/J]")
-    add("check", _check, "check the state space against the descriptor form; write the figures (json)", "FILE")
+    add("check", run_check, "check the state space against the descriptor form; write the figures (json)", "FILE")
     return parser
 
 
@@ -421,6 +148,19 @@ def _add_command(
         help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
     )
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
+    what = "name of a matrix in a file with several: C=D, K=sys.K, M=maa#2; C= for none"
+    parser.add_argument("--matrix", action="append", default=[], metavar="K=NAME", help=what)
+    parser.add_argument(
+        "--triangle", choices=("lower", "upper"), help="files store this triangle of symmetric matrices"
+    )
+    parser.add_argument("--remove-fixed", action="store_true", help="take out DOFs whose stiffness is 1e35 or more")
+    parser.add_argument(
+        "--element",
+        action="append",
+        default=[],
+        metavar="'KIND A [B] LAW'",
+        help="spring or damper to add, as 'damper y2 quadratic(1e4,30)'; linear commands take the tangent at rest",
+    )
     parser.set_defaults(inputs=None, outputs=None)
     if signals:
         parser.add_argument("--inputs", action="append", metavar="A,B", help="inputs, as F_y")

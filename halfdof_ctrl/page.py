@@ -13,17 +13,18 @@ from datetime import UTC, datetime
 import control
 import numpy as np
 
-from halfdof_ctrl.systems.crosscheck import STEP_TOLERANCE, TRANSFER_TOLERANCE, CrossCheck
-from halfdof_ctrl.design.lqr import StateFeedback
-from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalues_in_words
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import listed, name_from_label
+from halfdof_ctrl.design.lqr import StateFeedback
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.parts.mounts import scheme_of
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.crosscheck import STEP_TOLERANCE, TRANSFER_TOLERANCE, CrossCheck
+from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalues_in_words
 from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE
-from halfdof_ctrl.reduction.choose import ExactReduction
 
 SHOWN_STATES = 12  #: larger matrices are in the files only
 SHOWN_EIGENVALUES = 40
-MARK = "halfdof-ctrl"  #: stands in the page and tells it from others
+PAGE_MARK = "halfdof-ctrl"  #: stands in the page and tells it from others
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +75,11 @@ def page(findings: Findings, figures: Sequence[PageFigure], files: Iterable[str]
     template = importlib.resources.files("halfdof_ctrl").joinpath("report.html").read_text(encoding="utf-8")
     verdict, look = ("Cross-check passed", "good") if findings.check.passed else ("Cross-check FAILED", "bad")
     return string.Template(template).substitute(
-        mark=f"{MARK} {_version('halfdof_ctrl')}",
+        mark=f"{PAGE_MARK} {_version('halfdof_ctrl')}",
         title=html.escape(findings.model.name or "Mechanical model"),
         summary=html.escape(_summary(findings)),
         verdict=f'<span class="verdict {look}">{verdict}</span>',
-        notes="\n".join(f'<p class="note">{html.escape(note)}</p>' for note in findings.notes),
+        notes=_scheme(findings) + "\n".join(f'<p class="note">{html.escape(note)}</p>' for note in findings.notes),
         counts=html.escape(findings.eigenvalues.counts),
         eigenvalues=_eigenvalues(findings.eigenvalues),
         check=_check(findings.check),
@@ -88,6 +89,12 @@ def page(findings: Findings, figures: Sequence[PageFigure], files: Iterable[str]
         files=_links(files),
         provenance=html.escape(_provenance()),
     )
+
+
+def _scheme(findings: Findings) -> str:
+    """Return the scheme of a built-in mount, without which nobody can check M, C and K."""
+    scheme = scheme_of(findings.model)
+    return "" if scheme is None else f'<pre class="scheme">{html.escape(scheme)}</pre>\n'
 
 
 def _summary(findings: Findings) -> str:

@@ -13,25 +13,27 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import control
-import matplotlib.pyplot as plt
 import numpy as np
 
-from halfdof_ctrl.files.containers import PathLike
-from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
-from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError, own_messages, recording_warnings
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
-from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError
-from halfdof_ctrl.files.models import naming_target, replacing, save_system
+from halfdof_ctrl.files.containers import PathLike
+from halfdof_ctrl.files.systems import save_system
+from halfdof_ctrl.files.writing import naming_target
+from halfdof_ctrl.model.dense_copy import dense_copy
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.page import MARK, Findings, PageFigure, page
+from halfdof_ctrl.page import PAGE_MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots.figure_files import close_figure, save_figure
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
+from halfdof_ctrl.systems.frequency import descriptor_modes
 from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.working_states import working_system
 
-DPI = 200  #: of PNG figures
 COLUMN_WIDTH = 5.0  #: [in] of a figure with one column on the page, so that its text can be read on a phone
 SHOWN_OUTPUTS, SHOWN_INPUTS = 3, 2  #: what a Bode diagram on a phone can hold
 INDEX = "index.html"
@@ -88,15 +90,14 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with recording_warnings() as caught:
         findings = _found(model)
         shown, cut = _shown(model)
         plots = _plots(model, shown, findings.feedback)
     said = {str(warning.message): warning for warning in caught}
     for warning in said.values():
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    findings.notes.extend([*said, *cut])
+    findings.notes.extend([*own_messages(caught), *cut])
     build = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
     with naming_target(folder):
         build.mkdir()
@@ -106,7 +107,7 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     finally:
         shutil.rmtree(build, ignore_errors=True)
         for made in plots:
-            plt.close(made.plot.figure)
+            close_figure(made.plot)
     notes = (*findings.notes, *([] if findings.feedback else [findings.regulator]))
     return Report(
         folder=target,
@@ -121,8 +122,8 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     """Choose a weight of each input's square so that it costs about the energy that it stores.
 
     That is ``|B(s)^T P(s)^-1 B(s)| / 2``, half the receptance in the input's own direction, where s is the geometric
-    mean of the sizes of the finite eigenvalues (real, off all resonances): its unit makes the square of the input
-    an energy, whatever the input is.
+    mean of the sizes of the finite eigenvalues that the inputs move (real, off all resonances): its unit makes the
+    square of the input an energy, whatever the input is.
 
     Parameters
     ----------
@@ -146,8 +147,7 @@ def default_effort(model: SecondOrderModel) -> dict[str, float]:
     {'F_q0': 0.125}
     """
     model = dense_copy(model, "default_effort", "Give the weights.")
-    size = np.abs(pencil_structure(model).finite_eigenvalues)
-    moving = size[size > 1e-9 * size.max(initial=0.0)]
+    moving = np.abs(descriptor_modes(model.select(outputs=list(model.dofs)))[0].moving)
     s = float(np.exp(np.log(moving).mean())) if moving.size else 1.0
     motion = model.select(outputs=list(model.dofs))(s, squeeze=False)
     force = model.B + s * model.Bv + s**2 * model.Ba
@@ -194,21 +194,6 @@ def check_as_json(check: CrossCheck) -> bytes:
     return (json.dumps(figures, indent=2, allow_nan=False, ensure_ascii=False) + "\n").encode()
 
 
-def save_figure(cplt: control.ControlPlot, path: PathLike) -> None:
-    """Write a plot to a file whose ending is the format, and close it."""
-    kind = Path(path).suffix[1:].lower()
-    try:
-        with replacing(path) as stream:
-            cplt.figure.savefig(stream, format=kind, dpi=DPI)
-    finally:
-        plt.close(cplt.figure)
-
-
-def without_windows() -> None:
-    """Let matplotlib draw without a display from now on."""
-    plt.switch_backend("Agg")
-
-
 def _found(model: SecondOrderModel) -> Findings:
     reduction = exact_reduction(model)
     sys = mech2ss(reduction)
@@ -222,7 +207,7 @@ def _found(model: SecondOrderModel) -> Findings:
         reduction=reduction,
         sys=sys,
         check=check,
-        eigenvalues=eigenvalue_table(model, sys),
+        eigenvalues=eigenvalue_table(model, working_system(model)),
         feedback=feedback,
         regulator=words,
         notes=[],
@@ -296,7 +281,7 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
 
 def _require_own_folder(target: Path, given: PathLike) -> None:
     index = target / INDEX
-    foreign = index.exists() and not (index.is_file() and MARK in index.read_text("utf-8", errors="replace"))
+    foreign = index.exists() and not (index.is_file() and PAGE_MARK in index.read_text("utf-8", errors="replace"))
     if foreign or (target.exists() and not target.is_dir()):
         msg = f"{given}: there is something of that name that is no report. Choose another folder."
         raise FileFormatError(msg, path=str(given))

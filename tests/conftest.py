@@ -1,4 +1,4 @@
-"""Surroundings of all tests: hypothesis profiles, and a way to run everything without slycot.
+"""Surroundings of all tests: hypothesis profiles, no figures left, and a way to run everything without slycot.
 
 ``HYPOTHESIS_PROFILE=wide`` runs 1000 random examples a property instead of 50; both are derandomized, so a
 failure can be repeated. ``HALFDOF_WITHOUT_SLYCOT=1`` makes slycot unimportable before control is imported.
@@ -6,7 +6,9 @@ failure can be repeated. ``HALFDOF_WITHOUT_SLYCOT=1`` makes slycot unimportable 
 
 import os
 import sys
+from collections.abc import Iterator
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the workers of pytest-xdist share the cores already
@@ -26,3 +28,12 @@ settings.register_profile(
     "wide", derandomize=True, deadline=None, max_examples=1000, database=None, suppress_health_check=SLOW_DATA
 )
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "default"))
+
+
+@pytest.fixture(autouse=True)
+def _no_figures_left() -> Iterator[None]:
+    """Close what a test drew, so that none finds the figures of another."""
+    yield
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    if pyplot is not None:
+        pyplot.close("all")

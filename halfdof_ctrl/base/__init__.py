@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""What every room needs: errors, arrays, names, numbers, threads."""

@@ -1,4 +1,4 @@
-"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparsearrays`)."""
+"""Checked, read-only dense matrices: the one place where shapes and entries are tested (sparse: `sparse_arrays`)."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -10,15 +10,16 @@ from scipy.sparse import issparse
 
 from halfdof_ctrl.base.errors import MatrixError
 
+EPS = float(np.finfo(float).eps)  #: spacing of floating-point numbers at one
+IndexArray: TypeAlias = npt.NDArray[np.intp]
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
 Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
-
 DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
 LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense for what works on dense matrices alone
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
-PLAIN = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
+PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -82,7 +83,7 @@ def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matr
     MatrixError
         As in `checked_matrix`, or all are None.
     """
-    if all([type(value) in PLAIN for value in values]):  # noqa: C419  # a list is faster for three
+    if all([type(value) in PLAIN_TYPES for value in values]):  # noqa: C419  # a list is faster for three
         together = _stacked(values)
         if together is not None:
             return together
@@ -99,12 +100,12 @@ def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matr
 
 
 def zero_matrix(rows: int, columns: int) -> FloatArray:
-    """Give a read-only matrix of zeros; small ones are shared."""
+    """Return a read-only matrix of zeros; small ones are shared."""
     return _small_zeros(rows, columns) if rows * columns <= SHARED_SIZE else read_only(np.zeros((rows, columns)))
 
 
 def unit_matrix(size: int) -> FloatArray:
-    """Give a read-only identity matrix; small ones are shared."""
+    """Return a read-only identity matrix; small ones are shared."""
     return _small_unit(size) if size * size <= SHARED_SIZE else read_only(np.eye(size))
 
 
@@ -114,12 +115,12 @@ def powers_of_two(size: FloatArray) -> FloatArray:
 
 
 def is_complex(matrix: Matrix) -> bool:
-    """Tell whether a checked matrix has imaginary parts."""
+    """Return whether a checked matrix has imaginary parts."""
     return matrix.dtype != REAL
 
 
 def is_zero(matrix: Matrix) -> bool:
-    """Tell whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
+    """Return whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
     if type(matrix) is not np.ndarray and issparse(matrix):
         return bool(matrix.size == 0)  # of stored entries, none of which is zero
     shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)

@@ -6,10 +6,8 @@ The attributes repeat the facts for programs.
 
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-
-MOST_WORDS = 300  #: characters of another library's error that are passed on
 
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
@@ -28,6 +26,16 @@ class HalfdofError(ValueError):
         return _rebuild, (type(self), str(self), self.__dict__)
 
 
+class NoStateSpaceError(HalfdofError):
+    """A model has no state space, or none that working precision can tell; its frequency response exists all the same.
+
+    Whatever needs no state space (`frequency_response`, `bode_plot`, `pole_map_plot`, `sweep`) falls back to the
+    descriptor form where this is raised, and says `why`.
+    """
+
+    why = "no state space"  #: the cause in a few words
+
+
 class MatrixError(HalfdofError):
     """A matrix cannot be used: shape, kind of entry, NaN or Inf; `matrix` is its letter."""
 
@@ -36,8 +44,10 @@ class MatrixError(HalfdofError):
         self.matrix = matrix
 
 
-class ComplexModelError(HalfdofError):
+class ComplexModelError(NoStateSpaceError):
     """A real state space was asked for a complex model; `matrices` are the complex ones."""
+
+    why = "model is complex"
 
     def __init__(self, message: str, *, matrices: tuple[str, ...]) -> None:
         super().__init__(message)
@@ -61,11 +71,13 @@ class ParameterError(HalfdofError):
         self.value = value
 
 
-class SingularLeadingMatrixError(HalfdofError):
+class SingularLeadingMatrixError(NoStateSpaceError):
     """The leading matrix W of equation (2) is singular.
 
     `dofs` take part in its null vector, `rcond` is the reciprocal condition number after scaling.
     """
+
+    why = "W is singular"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], rcond: float) -> None:
         super().__init__(message)
@@ -86,11 +98,13 @@ class SingularPencilError(HalfdofError):
         self.equations = equations
 
 
-class UncertainRankError(HalfdofError):
+class UncertainRankError(NoStateSpaceError):
     """The order of the model cannot be told to working precision.
 
     `dofs` take part in the closest decision about a rank, `gap` is the ratio of the singular values there.
     """
+
+    why = "order uncertain"
 
     def __init__(self, message: str, *, dofs: tuple[str, ...], gap: float) -> None:
         super().__init__(message)
@@ -98,8 +112,18 @@ class UncertainRankError(HalfdofError):
         self.gap = gap
 
 
-class ImproperError(HalfdofError):
+class AssemblyError(HalfdofError):
+    """Parts and joints contradict each other or leave something loose; `names` are the points or parts."""
+
+    def __init__(self, message: str, *, names: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.names = names
+
+
+class ImproperError(NoStateSpaceError):
     """Some transfer functions grow with frequency; `pairs` lists (input, output, order of growth)."""
+
+    why = "improper"
 
     def __init__(self, message: str, *, pairs: tuple[tuple[str, str, int], ...]) -> None:
         super().__init__(message)
@@ -142,6 +166,42 @@ class StabilizationError(HalfdofError):
         self.quantity = quantity
 
 
+class LawError(HalfdofError):
+    """A law that is not linear cannot do what its place in the model asks of it.
+
+    `element` is the element in words, `dofs` are those it acts on.
+    """
+
+    def __init__(self, message: str, *, element: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.element = element
+        self.dofs = dofs
+
+
+class NoAnswerError(LawError):
+    """During a run no motion answers a force, or a law gives NaN or Inf.
+
+    `time` [s] is when, `force` [N] what found no answer (NaN where a law gave NaN), `state` the state reached.
+    """
+
+    def __init__(
+        self, message: str, *, element: str, dofs: tuple[str, ...], time: float, force: float, state: tuple[float, ...]
+    ) -> None:
+        super().__init__(message, element=element, dofs=dofs)
+        self.time = time
+        self.force = force
+        self.state = state
+
+
+class EnergyFormError(HalfdofError):
+    """A model has no energy coordinates; `reason` is one word for why, `dofs` are concerned."""
+
+    def __init__(self, message: str, *, reason: str, dofs: tuple[str, ...]) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.dofs = dofs
+
+
 class ModelSizeError(HalfdofError):
     """Something would be too large: `size` is the count that decides (DOFs, states, signals), `limit` the most."""
 
@@ -171,30 +231,6 @@ class MissingExtraError(FileFormatError):
         self.extra = extra
 
 
-@contextmanager
-def naming_the_file(path: object) -> Iterator[None]:
-    """Turn what goes wrong with a file's content into a refusal that names the file."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of the parsers of damaged headers; what is read gets checked
-            yield
-    except MissingExtraError as refusal:
-        msg = f"{path}: {refusal}"
-        raise MissingExtraError(msg, path=str(path), extra=refusal.extra) from refusal
-    except HalfdofError as refusal:
-        line = getattr(refusal, "line", None)
-        words = " ".join(str(refusal).splitlines())
-        msg = f"{path}{'' if line is None else f', line {line}'}: {words}"
-        raise FileFormatError(msg, path=str(path), line=line) from refusal
-    except OSError:
-        raise
-    except Exception as cause:  # the readers raise anything on damaged bytes: zlib.error, KeyError, struct.error, ...
-        reason = " ".join(str(cause).split()) or type(cause).__name__
-        reason = reason if len(reason) <= MOST_WORDS else f"{reason[:MOST_WORDS]}..."  # some quote the file at length
-        msg = f"{path}: the file is damaged or of another kind than its ending says ({reason}). Write it anew."
-        raise FileFormatError(msg, path=str(path)) from cause
-
-
 class WorkerError(HalfdofError):
     """Worker processes cannot start or cannot load what they are to do; `function` is its name."""
 
@@ -212,40 +248,69 @@ class SweepInterruptedError(KeyboardInterrupt):
 
 
 def callers_level() -> int:
-    """Give the `stacklevel` of a warning that is to point at the first line outside this package."""
+    """Return the `stacklevel` of a warning that is to point at the first line outside this package."""
     frame, level = sys._getframe(1), 1  # noqa: SLF001  # the way that the standard library goes too
     while frame.f_back is not None and frame.f_globals.get("__name__", "").split(".")[0] == __name__.split(".")[0]:
         frame, level = frame.f_back, level + 1
     return level
 
 
-class NearlyMasslessWarning(UserWarning):
+class HalfdofWarning(UserWarning):
+    """Base of every warning of this package."""
+
+
+@contextmanager
+def recording_warnings() -> Iterator[list[warnings.WarningMessage]]:
+    """Record every warning of this package, also one that was given before, and what the filters let through of others.
+
+    Nothing is hidden from filters that turn other packages' warnings into errors.
+    """
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.filterwarnings("always", category=HalfdofWarning)
+        yield caught
+
+
+def own_messages(caught: Iterable[warnings.WarningMessage]) -> list[str]:
+    """Give the texts of this package's own warnings, each once: the user can do nothing about other packages'."""
+    own = (warning for warning in caught if issubclass(warning.category, HalfdofWarning))
+    return list(dict.fromkeys(str(warning.message) for warning in own))
+
+
+class NearlyMasslessWarning(HalfdofWarning):
     """A DOF has a mass so small against the others that its two states cost digits."""
 
 
-class CloseDecisionWarning(UserWarning):
+class CloseDecisionWarning(HalfdofWarning):
     """A decision about a rank is close: a smaller tolerance or another rounding would give another order."""
 
 
-class LostDigitsWarning(UserWarning):
+class LostDigitsWarning(HalfdofWarning):
     """The state space is exact, but in floating point its transfer function is known to fewer digits than usual."""
 
 
-class DataLimitWarning(UserWarning):
+class DataLimitWarning(HalfdofWarning):
     """Entries known to their last digit do not determine a response to more digits than the message says."""
 
 
-class FailedCasesWarning(UserWarning):
+class InaccurateGainWarning(HalfdofWarning):
+    """A gain is optimal to fewer digits than usual, since rounding of the problem moves it."""
+
+
+class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
 
 
-class ImportedModelWarning(UserWarning):
+class ImportedModelWarning(HalfdofWarning):
     """What a finite-element program wrote is read as it stands, but is probably not what was meant."""
 
 
-class TruncationWarning(UserWarning):
+class TruncationWarning(HalfdofWarning):
     """A small model is far from the full one somewhere in the band that matters."""
 
 
-class InterruptedResponseWarning(UserWarning):
-    """A frequency response was stopped by the user; what it holds is right, but not all that was asked for."""
+class LostStateWarning(HalfdofWarning):
+    """The tangent of a nonlinear model has another number of states than the model, since a slope is zero there."""
+
+
+class InterruptedResponseWarning(HalfdofWarning):
+    """A response was stopped by the user; what it holds is right, but not all that was asked for."""

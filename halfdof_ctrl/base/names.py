@@ -45,7 +45,7 @@ def _cached_labels(names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def name_from_label(label: str) -> str:
-    """Give the model's name behind a label of `control_label`.
+    """Return the model's name behind a label of `control_label`.
 
     >>> name_from_label("101:1")
     '101.1'
@@ -173,7 +173,7 @@ def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
 
 
 def derivative_stems(name: str) -> list[tuple[str, int]]:
-    """Give the names of which this one would be the velocity or acceleration, with the order of the derivative.
+    """Return the names of which this one would be the velocity or acceleration, with the order of the derivative.
 
     >>> derivative_stems("y_ddot"), derivative_stems("y")
     ([('y', 2)], [])
@@ -253,7 +253,7 @@ def reconciled_names(
 def picked_places(
     names: Names, own: tuple[str, ...], dofs: tuple[str, ...], what: Literal["input", "output"]
 ) -> list[int]:
-    """Give the positions of names in a model's own signals followed by the physical ones (see `physical_places`).
+    """Return the positions of names in a model's own signals followed by the physical ones (see `physical_places`).
 
     Raises
     ------

@@ -101,6 +101,6 @@ def silence() -> Iterator[None]:
 
 
 def _is_watched() -> bool:
-    """Tell whether stderr is a terminal, or the code runs in a notebook."""
+    """Return whether stderr is a terminal, or the code runs in a notebook."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
     return hasattr(shell, "kernel") or sys.stderr.isatty()

@@ -5,7 +5,6 @@ kind, its inputs and outputs included.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Protocol, TypeAlias, cast
 
 import numpy as np
@@ -40,15 +39,11 @@ class SparseLike(Protocol):
 
 
 MatrixLike: TypeAlias = npt.ArrayLike | SparseLike
-
-
 MOST_STORED = 2**31 - 1  #: entries of a sparse matrix, which are counted in 32 bits by the factorization
-
-EXTENDED = 2**20  #: entries of a matrix that are copied in extended precision at a time
 
 
 def has_sparse(values: Sequence[object]) -> bool:
-    """Tell whether one of the values is a scipy sparse array or matrix."""
+    """Return whether one of the values is a scipy sparse array or matrix."""
     return any(issparse(value) for value in values)
 
 
@@ -122,44 +117,44 @@ def checked_sparse_squares(values: Sequence[object], letters: str) -> list[Matri
 
 
 def sparse_zeros(rows: int, columns: int) -> Matrix:
-    """Give a read-only sparse matrix without entries."""
+    """Return a read-only sparse matrix without entries."""
     return _locked(csc_array((rows, columns)))
 
 
 def sparse_unit(size: int) -> Matrix:
-    """Give a read-only sparse identity matrix."""
+    """Return a read-only sparse identity matrix."""
     return _locked(csc_array(eye_array(size, format="csc")))
 
 
 def zeros_like(pattern: Matrix, rows: int, columns: int) -> Matrix:
-    """Give zeros, dense or sparse as `pattern` is."""
+    """Return zeros, dense or sparse as `pattern` is."""
     return sparse_zeros(rows, columns) if is_sparse(pattern) else zero_matrix(rows, columns)
 
 
 def unit_like(pattern: Matrix, size: int) -> Matrix:
-    """Give an identity matrix, dense or sparse as `pattern` is."""
+    """Return an identity matrix, dense or sparse as `pattern` is."""
     return sparse_unit(size) if is_sparse(pattern) else unit_matrix(size)
 
 
 def is_sparse(matrix: object) -> bool:
-    """Tell whether a matrix of a model is sparse."""
+    """Return whether a matrix of a model is sparse."""
     return isinstance(matrix, csc_array)
 
 
 def as_sparse(matrix: Matrix) -> SparseMatrix:
-    """Give a matrix of a model as compressed columns, which those of a sparse model are."""
+    """Return a matrix of a model as compressed columns, which those of a sparse model are."""
     return cast("SparseMatrix", matrix) if is_sparse(matrix) else csc_array(matrix)
 
 
 def picked_beside(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
-    """Give the picked columns of matrices that stand side by side, all dense or all sparse."""
+    """Return the picked columns of matrices that stand side by side, all dense or all sparse."""
     if not is_sparse(parts[0]):
         return read_only(np.hstack(parts)[:, picked])
     return _locked(csc_array(as_sparse(joined_sparse([parts]))[:, list(picked)]))
 
 
 def picked_below(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
-    """Give the picked rows of matrices that stand one below the other, all dense or all sparse."""
+    """Return the picked rows of matrices that stand one below the other, all dense or all sparse."""
     if not is_sparse(parts[0]):
         return read_only(np.vstack(parts)[picked])
     stack = csr_array(as_sparse(joined_sparse([[part] for part in parts])))
@@ -199,7 +194,7 @@ def unit_columns(matrices: Sequence[Matrix]) -> list[tuple[int, int] | None]:
 
 
 def filled_rows(matrices: Sequence[Matrix]) -> list[bool]:
-    """Tell which rows have an entry in any of the matrices."""
+    """Return which rows have an entry in any of the matrices."""
     filled = np.zeros(matrices[0].shape[0], dtype=bool)
     for matrix in matrices:
         filled[as_sparse(matrix).indices] = True
@@ -207,81 +202,17 @@ def filled_rows(matrices: Sequence[Matrix]) -> list[bool]:
 
 
 def transposed(matrix: Matrix) -> Matrix:
-    """Give the transpose of a sparse matrix in compressed columns."""
+    """Return the transpose of a sparse matrix in compressed columns."""
     return cast("Matrix", csc_array(as_sparse(matrix).T))
 
 
-def times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
-    """Multiply a sparse and a dense matrix."""
-    return np.asarray(matrix @ dense)
-
-
-def transposed_times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
-    """Multiply the transpose of a sparse matrix and a dense matrix."""
-    return np.asarray(matrix.T @ dense)
-
-
-def exact_residual(matrix: SparseMatrix, right: Matrix, solution: Matrix, *, transposed: bool = False) -> Matrix:
-    """Give ``right - matrix solution``, summed in extended precision and rounded once.
-
-    Some columns of the matrix are worked at a time, so that it is not copied in that precision. Where a long double is
-    a double (Windows, ARM), this is the plain residual.
-
-    Examples
-    --------
-    >>> exact_residual(csc_array([[3.0]]), np.array([[1.0]]), np.array([[2.0]])).tolist()
-    [[-5.0]]
-    """
-    rest = np.array(right, dtype=np.longdouble)
-    wide = solution.astype(np.longdouble)
-    start = 0
-    while start < matrix.shape[1]:
-        room = matrix.indptr[start] + EXTENDED
-        stop = max(start + 1, int(np.searchsorted(matrix.indptr, room, side="right")) - 1)
-        part = slice(matrix.indptr[start], matrix.indptr[stop])
-        columns = csc_array(
-            (
-                matrix.data[part].astype(np.longdouble),
-                matrix.indices[part],
-                matrix.indptr[start : stop + 1] - matrix.indptr[start],
-            ),
-            shape=(matrix.shape[0], stop - start),
-        )
-        if transposed:
-            rest[start:stop] -= np.asarray(columns.T @ wide)
-        else:
-            rest -= np.asarray(columns @ wide[start:stop])
-        start = stop
-    return rest.astype(float)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Transposed:
-    """The transpose of a sparse matrix with few filled rows, ready to be multiplied."""
-
-    rows: IndexArray | None  #: filled rows of the matrix, None for all
-    part: csr_array  #: transpose of these
-
-    @classmethod
-    def of(cls, matrix: SparseMatrix) -> "Transposed":
-        """Prepare the transpose of a matrix."""
-        rows = np.unique(matrix.indices).astype(np.intp)
-        if rows.size > matrix.shape[0] // 2:
-            return cls(None, csr_array(matrix.T))
-        return cls(rows, csr_array(matrix.T[:, rows]))
-
-    def times(self, dense: Matrix) -> Matrix:
-        """Multiply with a dense matrix."""
-        return np.asarray(self.part @ (dense if self.rows is None else dense[self.rows]))
-
-
 def column_of_entries(matrix: SparseMatrix) -> IndexArray:
-    """Give the column of each stored entry."""
+    """Return the column of each stored entry."""
     return np.repeat(np.arange(matrix.shape[1]), np.diff(matrix.indptr))
 
 
 def largest_by_row_and_column(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
-    """Give the size of the largest entry of each row and of each column, zero where there is none."""
+    """Return the size of the largest entry of each row and of each column, zero where there is none."""
     size = np.abs(matrix.data)
     by_row, by_column = np.zeros(matrix.shape[0]), np.zeros(matrix.shape[1])
     np.maximum.at(by_row, matrix.indices, size)

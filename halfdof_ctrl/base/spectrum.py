@@ -1,16 +1,17 @@
 """Eigenvalues of a state matrix, and how far rounding alone may have moved each of them."""
 
 import numpy as np
+import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgebal
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 
-ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that are no fault
+ROUNDING_OF_A = 16 * EPS  #: relative errors in A that are no fault
 
 
 def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """Give the eigenvalues and the first-order bound of what rounding in A moves each.
+    """Return the eigenvalues and the first-order bound of what rounding in A moves each.
 
     The bound is 16 eps |A| over the cosine between left and right eigenvector, A balanced by powers of two. It
     holds for multiple eigenvalues as well: where rounding splits a double one by sqrt(eps), the computed
@@ -39,7 +40,7 @@ def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     values, left, right = scipy.linalg.eig(matrix, left=True, right=True)  # type: ignore[misc]  # stubs lack this case
     cosine = np.abs(np.einsum("ij,ij->j", left.conj(), right))
     with np.errstate(divide="ignore"):
-        return values, np.minimum(ROUNDING * np.linalg.norm(matrix, 2) / cosine, np.finfo(float).max)
+        return values, np.minimum(ROUNDING_OF_A * np.linalg.norm(matrix, 2) / cosine, np.finfo(float).max)
 
 
 def balanced(A: FloatArray) -> FloatArray:
@@ -62,3 +63,15 @@ def balanced_states(A: FloatArray) -> tuple[FloatArray, FloatArray]:
         return A, np.ones(0)
     matrix, _, _, factors, _ = dgebal(A, scale=1, permute=0)
     return np.asarray(matrix), np.asarray(factors)
+
+
+def sorted_eigenvalues(values: ComplexArray) -> ComplexArray:
+    """Sort by size, conjugate pairs with the positive imaginary part first."""
+    return values[order_by_size(values)]
+
+
+def order_by_size(values: ComplexArray) -> npt.NDArray[np.intp]:
+    """Return the order by size, conjugate pairs with the positive imaginary part first."""
+    with np.errstate(divide="ignore"):
+        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
+    return np.lexsort((-values.imag, size))

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""The oracle: what M, C, K say without the reduction, with which it shares no code."""

@@ -13,8 +13,8 @@ import numpy as np
 from halfdof_ctrl.base.arrays import ComplexArray
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
-POINTS = 12  #: on a circle
-WHOLE = 0.05  #: a mean that is farther from an integer counts nothing
+CIRCLE_POINTS = 12  #: on a circle
+WHOLE_COUNT = 0.05  #: a mean that is farther from an integer counts nothing
 TURN = 0.37  #: of the angle between points: keeps them off the real and the imaginary axis
 
 
@@ -32,14 +32,14 @@ class Contour:
         if not np.isfinite(mean):
             return None
         nearest = round(mean.real)
-        return nearest if abs(mean - nearest) <= WHOLE and nearest >= 0 else None
+        return nearest if abs(mean - nearest) <= WHOLE_COUNT and nearest >= 0 else None
 
 
 def contour(polynomial: ScaledPolynomial, center: complex, radius: float) -> Contour:
     """Sum over the eigenvalues in a circle."""
-    directions = np.exp(2j * np.pi * (np.arange(POINTS) + TURN) / POINTS)
+    directions = np.exp(2j * np.pi * (np.arange(CIRCLE_POINTS) + TURN) / CIRCLE_POINTS)
     if polynomial.is_real and complex(center).imag == 0.0:  # points in conjugate pairs: half of them say all
-        half = np.exp(2j * np.pi * (np.arange(POINTS // 2) + 0.5) / POINTS)
+        half = np.exp(2j * np.pi * (np.arange(CIRCLE_POINTS // 2) + 0.5) / CIRCLE_POINTS)
         slopes = polynomial.logarithmic_derivative(center + radius * half)
         directions, slopes = np.concatenate([half, half.conj()]), np.concatenate([slopes, slopes.conj()])
     else:

@@ -11,12 +11,12 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import DataLimitWarning, callers_level
-from halfdof_ctrl.model.evaluation import SUSPECT, data_limit, transfer_and_growth
-from halfdof_ctrl.model.refinement import DataLimit
+from halfdof_ctrl.model.evaluation import data_limit, transfer_and_growth
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 WARNED = 1e-6  #: part of the value from which (DATA) is told
-SHIFT = 1e-8  #: relative change of frequency that nobody notices: what it changes beside a pole or a zero is no loss
+SMALL_SHIFT = 1e-8  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
 
 
 def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -> ComplexArray:
@@ -35,7 +35,7 @@ def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -
         (model.D, model.Dv, model.Da),
     )
     values, growth = transfer_and_growth(*coefficients, points)
-    suspect = np.flatnonzero((growth > SUSPECT) & np.isfinite(growth))
+    suspect = np.flatnonzero((growth > SUSPECT_GROWTH) & np.isfinite(growth))
     if suspect.size:
         limit = data_limit(*coefficients, points[suspect])
         warn_of_data(model, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)
@@ -60,7 +60,8 @@ def warn_of_data(
     """
     size = np.abs(values)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        share = np.where((size > 0.0) & np.isfinite(size) & (limit.data > SHIFT * limit.slope), limit.data / size, 0.0)
+        told = (size > 0.0) & np.isfinite(size) & (limit.data > SMALL_SHIFT * limit.slope)
+        share = np.where(told, limit.data / size, 0.0)
     if not share.size or not share.max() > WARNED:
         return
     i, j, k = np.unravel_index(int(np.argmax(share)), share.shape)

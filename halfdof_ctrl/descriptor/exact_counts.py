@@ -19,7 +19,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.descriptor.residues import PRIMES, Residues, product, rank, reduced, residues
 
-SEED = 20261129  #: of the points at which ranks are looked at
+RANK_SEED = 20261129  #: of the points at which ranks are looked at
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -125,7 +125,7 @@ def core(N: Residues, p: int) -> Residues:
 
 def random_point(p: int) -> int:
     """Return a point that knows nothing of the numbers."""
-    return int(np.random.default_rng(SEED).integers(2**16, p - 1))
+    return int(np.random.default_rng(RANK_SEED).integers(2**16, p - 1))
 
 
 def at_point(parts: Sequence[Residues], s0: int, p: int) -> Residues:

@@ -14,9 +14,9 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, Matrix
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE, Evidence, Pencil, deflated, deflated_once
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT, Evidence, Pencil, deflated, deflated_once
 
-GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where a rank is looked at that holds almost everywhere
+GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: of a mean frequency: ranks there hold almost everywhere
 CLEAR_MARGIN = 1000.0  #: a rank decision with less than this margin is looked at twice
 
 
@@ -161,5 +161,5 @@ def _normal_rank(pencil: Pencil) -> int:
     ranks = []
     for s in GENERIC_POINTS:
         values = scipy.linalg.svdvals(scaled.A - s * scaled.E)
-        ranks.append(int(np.count_nonzero(values > RANK_TOLERANCE * max(pencil.E.shape) * values.max(initial=0.0))))
+        ranks.append(int(np.count_nonzero(values > ZERO_PIVOT * max(pencil.E.shape) * values.max(initial=0.0))))
     return max(ranks)

@@ -39,7 +39,7 @@ PLACES = (
 AROUND = 0.3  #: of the largest: eigenvalues around zero have a smaller mean
 CHECKS = 5  #: points at which the list is proved
 SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
-SEED = 7  #: of the directions of these points
+DIRECTION_SEED = 7  #: of the directions of these points
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -96,7 +96,7 @@ def finite_spectrum(
 
 
 def _zero_bounds(found: _Findings, exact: int) -> FloatArray:
-    """Give exact zeros no bound, the others the radius within which they are."""
+    """Return exact zeros no bound, the others the radius within which they are."""
     return np.where(np.arange(found.zeros) < exact, 0.0, found.radius)
 
 
@@ -149,7 +149,7 @@ def _weights(polynomial: ScaledPolynomial, estimates: Estimates) -> npt.NDArray[
 
 
 def _is_told(estimates: Estimates) -> npt.NDArray[np.bool_]:
-    """Tell which estimates are known, but for those that parts of some hundred roundings make far from all others.
+    """Return which estimates are known, but for those that parts of some hundred roundings make far from all others.
 
     A product of matrices rounds by tens of eps, which the entries of the result do not show. So what such parts could
     make of an infinite eigenvalue, far above the others, or of one at the origin, far below, is not told from rounding.
@@ -169,7 +169,7 @@ def _is_told(estimates: Estimates) -> npt.NDArray[np.bool_]:
 
 
 def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArray[np.bool_]:
-    """Tell which estimates stand for eigenvalues at the origin: below all known ones, and not told from zero."""
+    """Return which estimates stand for eigenvalues at the origin: below all known ones, and not told from zero."""
     size = np.abs(estimates.values)
     known = np.flatnonzero(_is_told(estimates))
     below = np.arange(size.size) < known[0] if known.size else size <= TINY
@@ -286,7 +286,7 @@ def _is_proved(polynomial: ScaledPolynomial, found: _Findings, largest: float) -
     radii = np.unique(
         np.concatenate([np.quantile(size, np.linspace(0.1, 0.9, CHECKS - 2)), [low / 2.0, 2.0 * max(largest, low)]])
     )
-    angles = np.random.default_rng(SEED).uniform(0.2, 1.3, radii.size)  # off the axes
+    angles = np.random.default_rng(DIRECTION_SEED).uniform(0.2, 1.3, radii.size)  # off the axes
     points = np.asarray(radii * np.exp(1j * angles) * (1.0 + 0.01 * angles))
     with np.errstate(all="ignore"):
         right = points * polynomial.logarithmic_derivative(points)

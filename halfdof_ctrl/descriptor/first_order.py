@@ -16,10 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray, Matrix
 from halfdof_ctrl.descriptor.balancing import balancing_powers, equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import connected_parts
-from halfdof_ctrl.descriptor.staircase import RANK_TOLERANCE
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,15 +61,15 @@ def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
 def _factors_of_part(part: Matrix) -> tuple[Matrix, Matrix]:
     down, across = equilibrating_powers(np.abs(part))
     left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
-    rank = int(np.count_nonzero(values > RANK_TOLERANCE * max(part.shape) * values[0]))
+    rank = int(np.count_nonzero(values > ZERO_PIVOT * max(part.shape) * values[0]))
     left, right = left[:, :rank], right[:rank]
-    speck = max(part.shape) * np.finfo(float).eps * values[0] / values[rank - 1]
+    speck = max(part.shape) * EPS * values[0] / values[rank - 1]
     left, right = (np.where(np.abs(vectors) <= speck, 0.0, vectors) for vectors in (left, right))
     return left * values[:rank] / down[:, None], right / across
 
 
 def time_scale(coefficients: Sequence[Matrix]) -> float:
-    """Give a typical frequency as a power of two: the mean, in the logarithm, of what each entry has to say.
+    """Return a typical frequency as a power of two: the mean, in the logarithm, of what each entry has to say.
 
     A place (i, j) with entries in R_h and R_l, h > l the highest and the lowest there are, balances at the frequency
     ``|R_l,ij / R_h,ij|^(1 / (h - l))``, in any unit of its row and column. Where no place has two, rows are asked.
@@ -81,10 +82,15 @@ def time_scale(coefficients: Sequence[Matrix]) -> float:
 
 
 def _balances(sizes: FloatArray) -> FloatArray:
-    """Give the logarithms of the frequencies at which the lowest and the highest of each column are equal."""
+    """Return the logarithms of the frequencies at which the lowest and the highest of each column are equal."""
     present = sizes > 0.0
     several = present.sum(axis=0) > 1
     sizes, present = sizes[:, several], present[:, several]
     low, high = present.argmax(axis=0), len(sizes) - 1 - present[::-1].argmax(axis=0)
     every = np.arange(sizes.shape[1])
     return np.asarray((np.log2(sizes[low, every]) - np.log2(sizes[high, every])) / (high - low))
+
+
+def typical_frequency(model: SecondOrderModel) -> float:
+    """Return a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
+    return time_scale((model.K, model.C, model.M))

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
@@ -65,16 +64,9 @@ def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
 def nearly_singular(share: float) -> str:
     """Say that a model is regular by no more than rounding."""
     return (
-        f"the stored numbers are regular, but changes of {np.finfo(float).eps / share:.1e} of each entry can make "
-        f"det P(s) vanish identically, and rounding is {np.finfo(float).eps:.1e}"
+        f"the stored numbers are regular, but changes of {EPS / share:.1e} of each entry can make "
+        f"det P(s) vanish identically, and rounding is {EPS:.1e}"
     )
-
-
-def order_by_size(values: ComplexArray) -> npt.NDArray[np.intp]:
-    """Return the order by size, conjugate pairs with the positive imaginary part first."""
-    with np.errstate(divide="ignore"):
-        size = np.log(np.abs(values)).round(9)  # conjugates may differ by rounding
-    return np.lexsort((-values.imag, size))
 
 
 def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:

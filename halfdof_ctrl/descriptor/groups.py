@@ -12,18 +12,18 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.descriptor.contours import Contour, contour
 from halfdof_ctrl.descriptor.quotients import Estimates
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
 REACH = 8.0  #: estimates within so many of their bounds belong together
-CLOSE = 1e-6  #: estimates that were not settled and are closer than this part of their size belong together
+SAME_GROUP = 1e-6  #: estimates that were not settled and are closer than this part of their size belong together
 WELL_KNOWN = 1e-9  #: relative bound below which estimates stand for themselves, however close they are
-CLEARANCE = 6.0  #: ratio of the distance of the next eigenvalue to the spread of a group
+GROUP_CLEARANCE = 6.0  #: ratio of the distance of the next eigenvalue to the spread of a group
 FLOOR = 1e-9  #: relative radius of a group that seems to be one point
 ALIKE = 0.02  #: of the spread of the estimates: a smaller spread by the contour means one multiple eigenvalue
-PAIR = 2  #: two eigenvalues follow from their mean and their spread
+TWO_MEMBERS = 2  #: two eigenvalues follow from their mean and their spread
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,7 +99,7 @@ def _groups(values: ComplexArray, bounds: FloatArray, doubtful: npt.NDArray[np.b
     v, b = values[places], np.minimum(bounds[places], np.abs(values[places]))
     distance = np.abs(v[:, None] - v)
     near = (distance <= REACH * (b[:, None] + b)) & (distance <= 0.7 * np.maximum(np.abs(v)[:, None], np.abs(v)))
-    near |= distance <= CLOSE * np.abs(v)
+    near |= distance <= SAME_GROUP * np.abs(v)
     count, labels = connected_components(csr_array(near.astype(np.int8)), directed=False)
     return [places[labels == label] for label in range(count)]
 
@@ -115,11 +115,11 @@ def _resolved(
     inner = max(spread, float(np.minimum(bounds, np.abs(values)).min()), FLOOR * abs(center))
     gaps = np.abs(rest - center)
     outer = float(gaps.min(initial=np.inf))
-    if values.size == 1 and (outer > CLEARANCE * inner or bounds[0] <= CLOSE * abs(center)):
+    if values.size == 1 and (outer > GROUP_CLEARANCE * inner or bounds[0] <= SAME_GROUP * abs(center)):
         return values, bounds, None, None
-    if outer < CLEARANCE * inner:
+    if outer < GROUP_CLEARANCE * inner:
         return values, bounds, complex(rest[int(gaps.argmin())]), None
-    radius = np.sqrt(inner * min(outer, CLEARANCE**2 * inner))
+    radius = np.sqrt(inner * min(outer, GROUP_CLEARANCE**2 * inner))
     circle = contour(polynomial, center, radius)
     if circle.count is None:
         return values, bounds, None, "a group of eigenvalues near {:.4g} rad/s is not resolved"
@@ -138,12 +138,12 @@ def _by_moments(
     spread, wide = float(np.abs(values - center).max()), float(np.sqrt(abs(variance)))
     noise = radius * abs(complex(circle.moments[0]) - count)
     if wide <= max(ALIKE * spread, FLOOR * abs(center)) or wide**2 <= 4.0 * noise * radius:
-        size = max(noise, np.finfo(float).eps * abs(center)) + wide
+        size = max(noise, EPS * abs(center)) + wide
         return np.full(count, center + mean), np.full(count, size)
-    if count == PAIR:
+    if count == TWO_MEMBERS:
         step = np.sqrt(variance)
         found = np.array([center + mean + step, center + mean - step])
-        return found, np.full(PAIR, min(float(bounds.max()), wide) + noise)
+        return found, np.full(TWO_MEMBERS, min(float(bounds.max()), wide) + noise)
     if count == values.size:
         return values, np.maximum(bounds, wide)
     return np.full(count, center + mean), np.full(count, spread + wide)

@@ -95,7 +95,7 @@ def _bounds(model: SecondOrderModel, index: int) -> IntArray:
 
 
 def _degrees(coefficients: tuple[Matrix, ...]) -> IntArray:
-    """Give the degree of each entry of a matrix polynomial."""
+    """Return the degree of each entry of a matrix polynomial."""
     degrees = np.full(coefficients[0].shape, NO_GROWTH, dtype=np.int64)
     for power, matrix in enumerate(coefficients):
         degrees[matrix != 0.0] = power
@@ -137,7 +137,7 @@ def _degree_of_pair(model: SecondOrderModel, i: int, j: int) -> int:
 
 
 def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[Matrix]:
-    """Give the coefficients of the system pencil (9) of some outputs and inputs."""
+    """Return the coefficients of the system pencil (9) of some outputs and inputs."""
     return [
         np.block([[P, -B[:, inputs]], [F[outputs], D[np.ix_(outputs, inputs)]]])
         for P, B, F, D in (

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.descriptor.balancing import balancing_powers
 from halfdof_ctrl.descriptor.exact_counts import (
     normal_rank,
@@ -27,7 +27,7 @@ from halfdof_ctrl.descriptor.scaled_polynomial import mean_frequency
 
 SEEDS = (1, 2)  #: of the two combinations
 AGREE = 1e-6  #: relative distance up to which a root of one is clearly one of the other
-APART = 100.0  #: ratio of the distances of the first that does not count and the last that does
+ZEROS_APART = 100.0  #: ratio of the distances of the first that does not count and the last that does
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,7 +126,7 @@ def _common_roots(squares: Sequence[Sequence[Matrix]], count: int, at_origin: in
     elif wanted:
         last = distance[wanted - 1]
         following = distance[wanted] if distance.size > wanted else np.inf
-        if last > AGREE and following < APART * last:
+        if last > AGREE and following < ZEROS_APART * last:
             doubts.append(
                 f"{count} are common to two combinations of minors, the last of them to {last:.0e}, and another to "
                 f"{following:.0e}"
@@ -145,6 +145,6 @@ def _matched(first: ComplexArray, second: ComplexArray) -> tuple[ComplexArray, F
     with np.errstate(invalid="ignore"):
         distance = np.abs(first[:, None] - second) / (np.abs(first)[:, None] + np.abs(second))
     distance = np.nan_to_num(distance)  # 0 from 0 is no distance
-    rows, columns = scipy.optimize.linear_sum_assignment(np.log(distance + np.finfo(float).eps))
+    rows, columns = scipy.optimize.linear_sum_assignment(np.log(distance + EPS))
     order = np.argsort(distance[rows, columns], kind="stable")
     return (first[rows] + second[columns])[order] / 2.0, distance[rows, columns][order]

@@ -12,15 +12,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
-GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: in units of the mean frequency
-EPS = float(np.finfo(float).eps)
-ITERATIONS = 12  #: of the power method, for a factor that need not be known well
+POWER_ITERATIONS = 12  #: of the power method, for a factor that need not be known well
 UNDECIDED = 1e-2  #: a share of rounding above may hide that a model is singular: products round by tens of eps
 
 
@@ -83,7 +82,7 @@ def _inverse(P: ComplexArray) -> ComplexArray:
 def _spectral_radius(left: FloatArray, right: FloatArray) -> float:
     """Return the spectral radius of a product of matrices without negative entries, by the power method."""
     vector, radius = np.ones(right.shape[1]), 0.0
-    for _ in range(ITERATIONS):
+    for _ in range(POWER_ITERATIONS):
         image = left @ (right @ vector)
         radius = float(image.max(initial=0.0))
         if not 0.0 < radius < np.inf:

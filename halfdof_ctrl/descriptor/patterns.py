@@ -23,7 +23,7 @@ Places: TypeAlias = npt.NDArray[np.intp]
 
 
 def diagonal_blocks(pattern: BoolArray) -> list[tuple[Places, Places]]:
-    """Give rows and columns of the blocks on the diagonal of the block triangular form.
+    """Return rows and columns of the blocks on the diagonal of the block triangular form.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def diagonal_blocks(pattern: BoolArray) -> list[tuple[Places, Places]]:
 
 
 def connected_parts(pattern: BoolArray) -> list[tuple[Places, Places]]:
-    """Give rows and columns of the parts that share no row and no column, null rows and columns left out.
+    """Return rows and columns of the parts that share no row and no column, null rows and columns left out.
 
     Examples
     --------
@@ -92,7 +92,7 @@ def _reached(pattern: BoolArray, matched: Places) -> tuple[BoolArray, BoolArray]
 
 
 def _inverse(matched: Places, size: int) -> Places:
-    """Give the row of each column, -1 for those without."""
+    """Return the row of each column, -1 for those without."""
     inverse = np.full(size, -1, dtype=np.intp)
     taken = np.flatnonzero(matched >= 0)
     inverse[matched[taken]] = taken

@@ -19,21 +19,20 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
-EPS = float(np.finfo(float).eps)
 SMALL_STEP = 1e-8  #: relative: a step below needs no better vectors
 STEP_IN_BOUNDS = 1000.0  #: nor does one within so many bounds
-ROUNDS = 4  #: of inverse iteration at most
-ITERATIONS = 2  #: of inverse iteration from each side
-SETTLED = 4.0  #: a step within so many bounds ends the rounds
+QUOTIENT_ROUNDS = 4  #: of inverse iteration at most
+INVERSE_ITERATIONS = 2  #: of inverse iteration from each side
+SETTLED_BOUNDS = 4.0  #: a step within so many bounds ends the rounds
 SLOW = 0.3  #: rounds end where a step is not smaller by this factor, and not within the bound
 MOST_ITERATED = 100  #: eigenvalues that are iterated, each of which takes factorizations
 FARTHEST = 1e100  #: starts beyond are infinite
 KNOWN = 0.05  #: an eigenvalue is told from others where its bound is below this part of its size
-LOST = 0.3  #: a start that moves by more than this part of its size belongs to no eigenvalue nearby
+STRAYED = 0.3  #: a start that moves by more than this part of its size belongs to no eigenvalue nearby
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,17 +123,17 @@ def _iterated(
     """Improve one eigenvalue by inverse iteration and quotients whose residual is exact but for one rounding."""
     s, last = complex(start), float("inf")
     with np.errstate(all="ignore"):
-        for _ in range(ROUNDS):
+        for _ in range(QUOTIENT_ROUNDS):
             x, y = _inverse_iteration(polynomial, s, x, y)
             step, bound = _exact_step(polynomial, exact, s, x, y)
             if not np.isfinite(step) or abs(step) > 2.0 * abs(s):
                 break
-            is_settled = abs(step) <= max(SETTLED * bound, 2.0 * EPS * abs(s))
+            is_settled = abs(step) <= max(SETTLED_BOUNDS * bound, 2.0 * EPS * abs(s))
             if not is_settled and abs(step) > SLOW * last:  # a multiple eigenvalue is not found in this way
                 break
             s, last = s - step, abs(step)
             if is_settled:
-                return s, bound, abs(s - start) <= LOST * abs(s)
+                return s, bound, abs(s - start) <= STRAYED * abs(s)
     return s, float("inf"), False
 
 
@@ -160,7 +159,7 @@ def _inverse_iteration(
     tiny = EPS * np.abs(diagonal).max(initial=0.0) * EPS
     weak = np.flatnonzero(np.abs(diagonal) <= tiny)
     lu[weak, weak] = tiny if tiny > 0.0 else 1.0
-    for _ in range(ITERATIONS):
+    for _ in range(INVERSE_ITERATIONS):
         x, _ = zgetrs(lu, pivots, x, trans=0)
         y, _ = zgetrs(lu, pivots, y, trans=1)
         x, y = (vector / np.abs(vector).max(initial=0.0) for vector in (x, y))

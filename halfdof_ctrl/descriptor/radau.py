@@ -26,7 +26,7 @@ STAGES = 5
 RESOLUTION = 0.25  #: step length times the size of the fastest eigenvalue that still moves
 GONE = 33.0  #: time constants after which a mode is below rounding, exp(-33) = 5e-15
 GROWN = 5.0  #: time constants for which a growing mode is followed, which multiplies rounding by exp(5) = 150
-MOST_STEPS = 1500  #: steps of one integration; the horizon shrinks where they do not suffice
+MOST_RADAU_STEPS = 1500  #: steps of one integration; the horizon shrinks where they do not suffice
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +37,7 @@ class Segment:
     steps: int
 
 
-def step_plan(eigenvalues: ComplexArray, most_steps: int = MOST_STEPS) -> tuple[Segment, ...]:
+def step_plan(eigenvalues: ComplexArray, most_steps: int = MOST_RADAU_STEPS) -> tuple[Segment, ...]:
     """Choose steps that resolve every mode for as long as it moves, up to a period of the slowest one.
 
     Parameters
@@ -125,7 +125,7 @@ class RadauStep:
         return cls(h, A, rows, tuple(factors))
 
     def advance(self, x: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Give the states (n, k) one step later, and their slopes there."""
+        """Return the states (n, k) one step later, and their slopes there."""
         right = (self.rows * (self.A @ x + b)).astype(np.complex128)
         change, slope = np.zeros_like(x), np.zeros_like(x)
         for mode, factor in zip(_modes(), self.factors, strict=True):
@@ -157,7 +157,7 @@ def _modes() -> tuple[_Mode, ...]:
 
 
 def radau_points(stages: int = STAGES) -> FloatArray:
-    """Give the Radau points on (0, 1], the last of them 1."""
+    """Return the Radau points on (0, 1], the last of them 1."""
     inner, _ = scipy.special.roots_jacobi(stages - 1, 1.0, 0.0)
     return np.append((inner + 1.0) / 2.0, 1.0)
 

@@ -1,9 +1,4 @@
-"""Whether the pencil of a sparse model is regular, for the oracle: one factorization and a few steps of iteration.
-
-At a generic point s the equilibrated P(s) of a regular pencil has a smallest singular value away from rounding. It is
-found by inverse iteration on P(s)^H P(s), which ends in a null vector where there is one. The reduction does not use
-this module.
-"""
+"""Whether det P(s) vanishes at every s, told by the oracle for itself, dense and sparse."""
 
 from typing import Any, cast
 
@@ -11,19 +6,23 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import SingularPencilError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.exact_counts import normal_rank
+from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
+from halfdof_ctrl.descriptor.first_order import typical_frequency
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding, undecided_regularity
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.model.sparse_evaluation import PIVOTINGS, PointFactors, SparsePencil
+from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE, causes, null_spaces, singular_pencil_error
+from halfdof_ctrl.model.sparse_evaluation import PointFactors, SparsePencil
 
-GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: where P(s) is looked at, in units of the time scale
-SINGULAR = 64 * float(np.finfo(float).eps)  #: of the largest singular value: a smallest one below is rounding of zero
-NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
+SINGULAR_PENCIL = 64 * EPS  #: of the largest singular value: a smallest one below is rounding of zero
+PENCIL_NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
 STEPS = 4  #: of inverse iteration
-NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 
 
 @limited_threads(1)
@@ -39,7 +38,7 @@ def require_regular_sparse(model: SecondOrderModel) -> None:
     gamma, pencil = _time_scale(coefficients), SparsePencil.on_one_pattern(coefficients)
     for point in GENERIC_POINTS:
         ratio, null = _smallest_singular_value(pencil, gamma * point)
-        if ratio > SINGULAR:
+        if ratio > SINGULAR_PENCIL:
             return
     dofs = tuple([model.dofs[k] for k in np.flatnonzero(null > NULL_VECTOR_SHARE * null.max()).tolist()])
     msg = (
@@ -59,7 +58,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
         matrix, lu, known = factors.matrix, cast("Any", factors.lu), 1.0
     except RuntimeError:  # exactly singular
         matrix, _, _ = pencil.equilibrated_at(s)
-        nudge = diags_array(NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
+        nudge = diags_array(PENCIL_NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
         lu, known = splu(csc_array(matrix + nudge)), 0.0
     generator = np.random.default_rng(0)
     vector = generator.standard_normal(matrix.shape[0]) + 1j * generator.standard_normal(matrix.shape[0])
@@ -74,10 +73,41 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
 
 
 def _time_scale(coefficients: list[SparseMatrix]) -> float:
-    """Give a frequency [rad/s], a power of two, at which the largest entries of K and M (or C) balance."""
+    """Return a frequency [rad/s], a power of two, at which the largest entries of K and M (or C) balance."""
     K, C, M = (float(np.abs(matrix.data).max(initial=0.0)) for matrix in coefficients)
     if K > 0.0 and M > 0.0:
         return float(2.0 ** np.round(np.log2(K / M) / 2.0))
     if K > 0.0 and C > 0.0:
         return float(2.0 ** np.round(np.log2(K / C)))
     return float(2.0 ** np.round(np.log2(C / M))) if C > 0.0 and M > 0.0 else 1.0
+
+
+def require_regular(model: SecondOrderModel) -> None:
+    """Refuse a singular pencil, naming the DOFs that nothing holds and the equations that say too little.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` of the stored numbers vanishes at every s, exactly.
+    UncertainRankError
+        It does not, but changes of the size of rounding could make it vanish.
+    """
+    if model.is_sparse:
+        require_regular_sparse(model)
+        return
+    coefficients = (model.K, model.C, model.M)
+    share = share_of_rounding(coefficients)
+    if share <= UNDECIDED:
+        return
+    n, rank = len(model.dofs), normal_rank(coefficients)
+    s = typical_frequency(model) * GENERIC_POINTS[0]
+    null = null_spaces(model.K + s * model.C + s**2 * model.M)
+    dofs = [model.dofs[index] for index in sorted(frozenset().union(*null.unknowns))]
+    if rank == n:
+        raise undecided_regularity(share, dofs)
+    raise singular_pencil_error(
+        dofs=dofs,
+        equations=[model.dofs[index] for index in sorted(frozenset().union(*null.equations))],
+        fact=f"its rank is {rank} of {n}",
+        causes=causes(null, coefficients, model.dofs),
+    )

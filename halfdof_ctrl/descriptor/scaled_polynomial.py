@@ -16,8 +16,8 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 
 FAR = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
-ABSENT = 1e9  #: weight of a place without entry
-BATCH_ENTRIES = 2**20  #: complex entries of P(s) held at a time (16 MB)
+ABSENT_WEIGHT = 1e9  #: of a place without entry, in the logarithm
+POLYNOMIAL_ENTRIES = 2**20  #: complex entries of P(s) held at a time (16 MB)
 SWEEPS = 3  #: of scaling P(s) at a point, rows and columns in turns
 
 
@@ -66,7 +66,7 @@ class ScaledPolynomial:
     def logarithmic_derivative(self, points: ComplexArray) -> ComplexArray:
         """Return ``p'/p = tr P(s)^-1 P'(s)`` of p = det P at every point, nan where P(s) is exactly singular."""
         found = np.full(points.shape, np.nan, dtype=np.complex128)
-        batch = max(1, BATCH_ENTRIES // max(1, self.coefficients[0].size))
+        batch = max(1, POLYNOMIAL_ENTRIES // max(1, self.coefficients[0].size))
         for start in range(0, points.size, batch):
             part = points[start : start + batch]
             P, slope = self.at(part), self.derivative_at(part)
@@ -92,7 +92,7 @@ def mean_frequency(coefficients: Sequence[Matrix]) -> float:
 def mean_frequency_between(coefficients: Sequence[Matrix], low: float, high: float) -> float:
     """Return the geometric mean of the tropical eigenvalues between two binary logarithms, one where there are none."""
     sizes = np.abs(np.stack(list(coefficients)))
-    logs = np.where(sizes > 0.0, np.log2(np.where(sizes > 0.0, sizes, 1.0)), -ABSENT)
+    logs = np.where(sizes > 0.0, np.log2(np.where(sizes > 0.0, sizes, 1.0)), -ABSENT_WEIGHT)
     first, last = (_largest_product(logs, at) for at in (low, high))
     roots = last[0] - first[0]
     return float(2.0 ** np.round((first[1] - last[1]) / roots)) if roots > 0 else 1.0

@@ -17,7 +17,7 @@ from halfdof_ctrl.model.refinement import DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
 
-SUSPECT = 1e10  #: growth of a random solution at the first frequency above which the pencil is tested for regularity
+SINGULAR_GROWTH = 1e10  #: of a random solution at the first frequency, above which the pencil is tested for regularity
 
 
 @limited_threads(1)
@@ -68,7 +68,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
     try:
         for index in progress(coarse_to_fine(frequencies.size), "frequencies"):
             values[:, :, index] = transfer.at(1j * frequencies[index])
-            if transfer.growth > SUSPECT and not done.any():
+            if transfer.growth > SINGULAR_GROWTH and not done.any():
                 require_regular_sparse(model)
             limit.data[:, :, index], limit.slope[:, :, index] = transfer.limit.data, transfer.limit.slope
             done[index] = True

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import Places, diagonal_blocks
 
-EPS = float(np.finfo(float).eps)
-RANK_TOLERANCE = 64 * EPS  #: times the size: pivots below this part of the largest are zero
-NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
+ZERO_PIVOT = 64 * EPS  #: times the size: pivots below this part of the largest are zero
+ROUNDING_NOISE = 512.0  #: entries within so many of their mean rounding errors are zero
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,11 +36,11 @@ class Pencil:
         return cls(A, E, (EPS * np.abs(A)) ** 2, (EPS * np.abs(E)) ** 2)
 
     def transposed(self) -> "Pencil":
-        """Give the pencil with rows and columns exchanged."""
+        """Return the pencil with rows and columns exchanged."""
         return Pencil(self.A.T, self.E.T, self.dA.T, self.dE.T)
 
     def reversed(self) -> "Pencil":
-        """Give ``E - s A``, which has the inverse eigenvalues."""
+        """Return ``E - s A``, which has the inverse eigenvalues."""
         return Pencil(self.E, self.A, self.dE, self.dA)
 
     def part(self, rows: Places, columns: Places) -> "Pencil":
@@ -70,7 +69,7 @@ class Pencil:
         return [self.part(*places) for places in diagonal_blocks((self.A != 0.0) | (self.E != 0.0))]
 
     def eigenvalues(self) -> ComplexArray:
-        """Give the eigenvalues by QZ; E must be nonsingular."""
+        """Return the eigenvalues by QZ; E must be nonsingular."""
         if self.E.shape[0] == 0:
             return np.zeros(0, dtype=np.complex128)
         return np.asarray(scipy.linalg.eigvals(self.A, self.E), dtype=np.complex128)
@@ -84,7 +83,7 @@ class Evidence:
     margin: float = float("inf")  #: smallest ratio of a pivot that counts to the level from which it would not
 
     def and_also(self, other: "Evidence") -> "Evidence":
-        """Give the weaker of both."""
+        """Return the weaker of both."""
         return Evidence(min(self.gap, other.gap), min(self.margin, other.margin))
 
 
@@ -135,12 +134,12 @@ def deflated_once(pencil: Pencil) -> Step:
 
 
 def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, Evidence]:
-    """Give an orthogonal matrix whose first columns span the range, the rank, and how clear it is."""
+    """Return an orthogonal matrix whose first columns span the range, the rank, and how clear it is."""
     if not matrix.any():
         return np.eye(matrix.shape[0]), 0, Evidence()
     left, triangle, _ = scipy.linalg.qr(matrix, pivoting=True)
     pivots = np.abs(np.diagonal(triangle))
-    level = max(RANK_TOLERANCE * max(matrix.shape) * pivots[0], NOISE * np.sqrt(squares.max()))
+    level = max(ZERO_PIVOT * max(matrix.shape) * pivots[0], ROUNDING_NOISE * np.sqrt(squares.max()))
     rank = int(np.count_nonzero(pivots > level))
     if rank == 0:
         return left, 0, Evidence()
@@ -156,5 +155,5 @@ def _product(left: Matrix, matrix: Matrix, squares: FloatArray) -> tuple[Matrix,
     """
     product = left @ matrix
     mean = np.abs(left) ** 2 @ squares + EPS**2 * ((left != 0.0).astype(float) @ np.abs(matrix) ** 2)
-    noise = np.abs(product) <= NOISE * np.sqrt(mean)
+    noise = np.abs(product) <= ROUNDING_NOISE * np.sqrt(mean)
     return np.where(noise, 0.0, product), np.where(noise, 0.0, mean)

@@ -1,8 +1,8 @@
 """Eigenvalues over more decades than QZ has digits: one unit of time for the slow ones, one for the fast ones.
 
-QZ is as accurate as the largest entries of the scaled pencil let it be. Eigenvalues that are 16 decades smaller than
-the mean are nothing to it, and those that are so much larger are infinite, although the entries that make them may be
-known to the last digit. In the unit that is the mean of the tropical eigenvalues beyond what is known they stand alone.
+QZ is as accurate as the largest entries of the scaled pencil let it be. Eigenvalues that are 16 decades below the mean
+are nothing to it, and those that are so much larger are infinite, although the entries that make them may be known
+to the last digit. In the unit that is the mean of the tropical eigenvalues beyond what is known they stand alone.
 """
 
 import numpy as np

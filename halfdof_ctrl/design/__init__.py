@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Controllers."""

@@ -11,14 +11,15 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.dense.partition import DofPartition
-from halfdof_ctrl.reduction.choose import ExactReduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
 
 Weights: TypeAlias = Mapping[str, float] | None
 
 INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
-UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+UNSYMMETRIC_WEIGHTS = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,6 +29,14 @@ class Cost:
     Q: FloatArray  #: (N, N)
     R: FloatArray  #: (m, m)
     N: FloatArray  #: (N, m)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PhysicalWeights:
+    """What a cost is made of, checked."""
+
+    motions: tuple[dict[str, float], ...]  #: of displacements, velocities, accelerations, by DOF
+    energy: float | None
 
 
 def given_cost(
@@ -52,25 +61,32 @@ def given_cost(
     return cost
 
 
-def physical_cost(reduction: ExactReduction, motions: list[Weights], effort: Weights, energy: float | None) -> Cost:
+def checked_weights(model: SecondOrderModel, motions: list[Weights], energy: float | None) -> PhysicalWeights:
+    """Check weights of displacements, velocities and accelerations, and of the energy."""
+    return PhysicalWeights(
+        tuple([dict(_checked_weights(weights, model.dofs, "DOF")) for weights in motions]),
+        None if energy is None else _checked_weight("energy", energy),
+    )
+
+
+def physical_cost(reduction: ExactReduction, weights: PhysicalWeights, effort: Weights) -> Cost:
     """Assemble Q, R and N from weights on motions, inputs and energy, equation (12)."""
     model = reduction.model
     n, m = reduction.B.shape
     Q, R, N = np.zeros((n, n)), np.zeros((m, m)), np.zeros((n, m))
     quantities: dict[str, float] = {}
-    for derivative, weights in enumerate(motions):
-        for dof, weight in _checked_weights(weights, model.dofs, "DOF"):
-            quantities[motion_names((dof,), derivative)[0]] = weight
+    for derivative, weighted in enumerate(weights.motions):
+        quantities |= {motion_names((dof,), derivative)[0]: weight for dof, weight in weighted.items()}
     parts = []
     if quantities:
         parts.append((*_weighted_rows(reduction, tuple(quantities)), np.diag(list(quantities.values()))))
-    if energy is not None:
-        parts += _energy_parts(reduction, _checked_weight("energy", energy))
+    if weights.energy is not None:
+        parts += _energy_parts(reduction, weights.energy)
     for C, D, W in parts:
         Q, N, R = Q + C.T @ W @ C, N + C.T @ W @ D, R + D.T @ W @ D
     for name, weight in _checked_weights(effort, model.inputs, "input"):
         R[model.inputs.index(name), model.inputs.index(name)] += weight
-    if not quantities and energy is None:
+    if not quantities and weights.energy is None:
         msg = "The cost sees no motion: weight a displacement, velocity, acceleration or the energy."
         raise WeightError(msg, names=())
     cost = Cost((Q + Q.T) / 2.0, (R + R.T) / 2.0, N)
@@ -93,7 +109,7 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 
 
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Give the rows and weights of the kinetic and the elastic energy."""
+    """Return the rows and weights of the kinetic and the elastic energy."""
     model, part = reduction.model, reduction.partition
     if model.prescribed:
         msg = (
@@ -157,11 +173,11 @@ def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:
 
 
 def _smallest_eigenvalue(matrix: FloatArray) -> float:
-    """Give the smallest eigenvalue after scaling the diagonal to one."""
+    """Return the smallest eigenvalue after scaling the diagonal to one."""
     scale = np.sqrt(np.abs(np.diagonal(matrix)))
     scale = np.where(scale > 0.0, scale, max(scale.max(initial=0.0), 1.0))
     return float(np.linalg.eigvalsh(matrix / scale / scale[:, None])[0])
 
 
 def _is_symmetric(matrix: FloatArray) -> bool:
-    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC * np.abs(matrix).max())
+    return bool(np.abs(matrix - matrix.T).max() <= UNSYMMETRIC_WEIGHTS * np.abs(matrix).max())

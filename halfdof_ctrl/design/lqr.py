@@ -6,16 +6,16 @@ The cost of the feedback u = -K x on a reduced model is
     E = 1/2 q'^T M q' + 1/2 q^T K q                                                        (12)
 
 Every quantity is C x + D u with the direct term of (4), so each weight w adds w C^T C to Q, w C^T D to N and
-w D^T D to R; half and static DOFs are weighted like any other. `control.lqr` solves the Riccati equation; what it
-returns is accepted only if the closed loop is stable.
+w D^T D to R; half and static DOFs are weighted like any other. What `control.lqr` finds is improved by Newton's method
+(`riccati`), and accepted only if the closed loop is stable and the gain known to 1e-6.
 
 A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is the second-order model
 
     M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
 """
 
+import warnings
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import control
 import numpy as np
@@ -23,19 +23,27 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.design.cost import Cost, Weights, given_cost, physical_cost
-from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.base.errors import StabilizationError, WeightError
-from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, callers_level
 from halfdof_ctrl.base.names import force_names, listed, motion_names
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
-from halfdof_ctrl.base.spectrum import balanced, balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.base.words import complex_in_words
+from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
+from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
+from halfdof_ctrl.design.reach import axis_eigenvalues, hidden_mode
+from halfdof_ctrl.design.riccati import Solver, solved_care
+from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
 
-UNREACHED = 1e-8  #: relative singular value below which a mode counts as not actuated or not weighted
+UNSEEN = 1e-8  #: imaginary parts, or displacements beside velocities, below this part are not shown
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
-MARGIN = 10 * np.finfo(float).eps  #: times N |A|: a pole nearer to the axis is not told from one on it
+MARGIN = 4.0  #: times its bound: a closed-loop pole nearer to the axis is not told from one on it
+GOOD = 1e-9  #: estimated error with which no other states are tried
+MANY = 24  #: states from which on energy coordinates are tried first: these are structures, whose DOFs lose digits
+WORTH = 0.1  #: of the estimated error: other states that leave more are not worth their way back to DOFs
+WARNED, REFUSED = 1e-8, 1e-6  #: estimated errors of a gain that are said, and that are too much
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -47,6 +55,7 @@ class StateFeedback:
     cost: Cost  #: what was minimized
     K: FloatArray  #: (m, N) gain
     S: FloatArray  #: (N, N) solution of the Riccati equation: the cost from x is x^T S x
+    gain_error: float  #: estimated error of K, relative to the gain of each input in scaled states
     closed_loop: control.StateSpace  #: from the model's inputs to its outputs, with the feedback
     poles: ComplexArray  #: (N,) of the closed loop [rad/s]
 
@@ -61,7 +70,7 @@ class StateFeedback:
         return self.reduction.states
 
     def as_mechss(self) -> SecondOrderModel:
-        """Give the closed loop as a second-order model, equation (13).
+        """Return the closed loop as a second-order model, equation (13).
 
         Its finite eigenvalues are the closed-loop poles, which checks the design without the reduction.
 
@@ -79,7 +88,7 @@ class StateFeedback:
             raise WeightError(msg, names=self.inputs)
         model, K = self.model, self.K
         partition = self.reduction.partition
-        maps = () if isinstance(partition, SparsePartition) else partition.state_maps()
+        maps = partition.state_maps()
         gains = [K @ state_map for state_map in maps]  # on q, q' and, rarely, q''
         if len(gains) > DERIVATIVES:
             msg = f"Among the states are derivatives above the second: {listed(self.states)}. Use `closed_loop`."
@@ -104,8 +113,16 @@ class StateFeedback:
         lines.append(" " * (first + 2) + "".join(f"{state:>{width}}" for state in self.states))
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
-        poles = ", ".join(_in_words(pole) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
+        poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
         return "\n".join([*lines, f"  closed-loop poles: {poles}"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    K: FloatArray
+    S: FloatArray
+    error: float
+    poles: ComplexArray
 
 
 def lqr(
@@ -119,7 +136,7 @@ def lqr(
     acceleration: Weights = None,
     effort: Weights = None,
     energy: float | None = None,
-    method: Literal["scipy", "slycot"] = "scipy",
+    method: Solver = "scipy",
 ) -> StateFeedback:
     """Design a linear quadratic regulator for a mechanical model.
 
@@ -139,8 +156,8 @@ def lqr(
     energy : float, optional
         Weight of the total mechanical energy, kinetic and elastic [1/J].
     method : {"scipy", "slycot"}, optional
-        Solver, as in `control.lqr`. scipy's balances what the units of mechanics spread over many powers of
-        ten, and gives the same digits whether or not slycot is there.
+        Solver that gives the start, as in `control.lqr`. Newton's method takes both to the same digits, and where one
+        finds nothing the other is asked.
 
     Returns
     -------
@@ -157,7 +174,12 @@ def lqr(
         A weight on a DOF or input that is not there.
     StabilizationError
         No stabilizing gain: a mode on or right of the imaginary axis that the inputs do not reach, or one on
-        the axis that the cost does not see.
+        the axis that the cost does not see. Or none whose digits can be told: an estimated error above 1e-6.
+
+    Warns
+    -----
+    InaccurateGainWarning
+        The estimated error of the gain (`StateFeedback.gain_error`) is above 1e-8.
 
     Examples
     --------
@@ -177,12 +199,13 @@ def lqr(
         if effort is not None or energy is not None or any(weights is not None for weights in physical.values()):
             msg = "Give either the matrices Q, R, N or physical weights, not both."
             raise WeightError(msg, names=("Q", "R", "N"))
-        cost = given_cost(Q, R, N, reduction)
+        weights, cost = None, given_cost(Q, R, N, reduction)
     else:
-        cost = physical_cost(reduction, list(physical.values()), effort, energy)
+        weights = checked_weights(model, list(physical.values()), energy)
+        cost = physical_cost(reduction, weights, effort)
     plant = mech2ss(reduction)
-    gain, riccati = _solved(reduction, cost, method)
-    A, B = reduction.A, reduction.B
+    solved = _solved(reduction, cost, weights, method)
+    gain, A, B = solved.K, reduction.A, reduction.B
     closed = labelled_system(
         A - B @ gain,
         B,
@@ -198,52 +221,88 @@ def lqr(
         reduction=reduction,
         cost=cost,
         K=read_only(gain),
-        S=read_only(riccati),
+        S=read_only(solved.S),
+        gain_error=solved.error,
         closed_loop=closed,
-        poles=_eigenvalues(A - B @ gain),
+        poles=read_only(solved.poles),
     )
 
 
-def _solved(reduction: ExactReduction, cost: Cost, method: Literal["scipy", "slycot"]) -> tuple[FloatArray, FloatArray]:
-    """Solve by `control.lqr` and accept the gain only if it stabilizes."""
-    A, B = reduction.A, reduction.B
-    _require_stabilizing_solution(reduction, cost)
-    try:
-        gain, riccati, _ = control.lqr(A, B, cost.Q, cost.R, cost.N, method=method)
-    except (ArithmeticError, ValueError) as cause:  # what the solvers raise where they find no gain
-        raise _unsolved_error(_eigenvalues(A)) from cause
-    gain, riccati = np.asarray(gain) + 0.0, np.asarray(riccati)
-    poles = _eigenvalues(A - B @ gain)
-    margin = MARGIN * poles.size * np.linalg.norm(balanced(A - B @ gain))
-    if not np.isfinite(gain).all() or (poles.real >= -margin).any():
-        raise _unsolved_error(poles)
-    return gain, riccati
+def _solved(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | None, method: Solver) -> _Solved:
+    """Solve the Riccati equation, and accept the gain only if it stabilizes and is known well enough."""
+    refusal: StabilizationError | None = None
+    best: _Solved | None = None
+    in_energy = (True, False) if reduction.order > MANY else (False, True)
+    for energy in in_energy:
+        plant = plant_in_energy_states(reduction, cost, weights) if energy else plant_of(reduction, cost)
+        if plant is None:
+            continue
+        try:
+            found = _solved_in(plant, reduction, method)
+        except StabilizationError as error:
+            refusal = error
+            continue
+        if best is None or found.error < WORTH * best.error:
+            best = found
+        if best.error <= GOOD:
+            break
+    if best is None:
+        raise refusal if refusal is not None else _unsolved_error(_eigenvalues(reduction.A))
+    if best.error > WARNED:
+        msg = (
+            f"The gain is known to {best.error:.1e} of its size only: that is what rounding of the entries of A, B, Q "
+            "and R does to it. The closed loop is stable; weights nearer to each other give a gain with more digits."
+        )
+        warnings.warn(msg, InaccurateGainWarning, stacklevel=callers_level())
+    return best
 
 
-def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None:
+def _solved_in(plant: Plant, reduction: ExactReduction, method: Solver) -> _Solved:
+    """Solve in the states of a plant, and go back to those of the reduction."""
+    _require_stabilizing_solution(reduction, plant)
+    found = solved_care(plant.problem, method, balance=plant.T is None)
+    if found is None:
+        raise _unsolved_error(_eigenvalues(plant.A))
+    poles = bounded_poles(plant.A - plant.B @ found.K)
+    if (poles.values.real >= -MARGIN * poles.bounds).any():
+        raise _unsolved_error(poles.values, float(poles.bounds[np.argmax(poles.values.real)]))
+    if not found.error <= REFUSED:
+        raise _inaccurate_error(found.error, poles.values)
+    K, S = (found.K, found.X) if plant.T is None else (found.K @ plant.T, plant.T.T @ found.X @ plant.T)
+    return _Solved(K + 0.0, S, found.error, poles.values)
+
+
+def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant) -> None:
     """Refuse a mode that no feedback stabilizes or that the optimal one would leave on the axis.
 
     A stabilizing solution of the Riccati equation exists if and only if every mode that is not stable is
     reached by the inputs and no mode on the imaginary axis is hidden from the cost (K. Zhou, J. C. Doyle and
     K. Glover, Robust and Optimal Control, theorem 13.7).
     """
-    A, B = reduction.A, reduction.B
+    A, B, cost = plant.A, plant.B, plant.cost
     cross = np.linalg.solve(cost.R, cost.N.T)
-    for eigenvalue in _axis_eigenvalues(A, right_too=True):
-        mode = _null_vector(A.T, B.T, eigenvalue)
-        if mode is not None:
-            force = _best_force(reduction, mode)
+    for eigenvalue in axis_eigenvalues(A, right_too=True):
+        hidden = hidden_mode(A.T, B.T, eigenvalue)
+        if hidden is not None:
+            mode, part = hidden
+            force = _best_force(reduction, mode if plant.T is None else plant.T.T @ mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is not stable and no input reaches it, so that no feedback "
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is not stable and the inputs reach it by "
+                f"{part:.0e} of a "
+                "usual mode, which is not told from nothing, so that no feedback "
                 f"stabilizes it. Actuate it: a force on DOF {force} moves it most (input F_{force})."
             )
             raise StabilizationError(msg, eigenvalue=eigenvalue, quantity=f"F_{force}")
-    for eigenvalue in _axis_eigenvalues(A - B @ cross, right_too=False):
-        mode = _null_vector(A - B @ cross, cost.Q - cost.N @ cross, eigenvalue)
-        if mode is not None:
-            kind, dof = _largest_motion(reduction, mode)
+    folded = A - B @ cross
+    for eigenvalue in axis_eigenvalues(folded, right_too=False):
+        hidden = hidden_mode(folded, cost.Q - cost.N @ cross, eigenvalue)
+        if hidden is not None:
+            mode, part = hidden
+            kind, dof = _largest_motion(reduction, mode if plant.T_inverse is None else plant.T_inverse @ mode)
             msg = (
-                f"The mode at {_in_words(eigenvalue)} rad/s is undamped and the cost does not see it, so that the "
+                f"The mode at {complex_in_words(eigenvalue, pair=True)} rad/s is undamped and the cost sees it by "
+                f"{part:.0e} of a usual "
+                "mode, which is not told from nothing, so that the "
                 f"optimal feedback leaves it where it is. Weight it: it shows most in the {kind} of DOF {dof}."
             )
             raise StabilizationError(
@@ -251,45 +310,29 @@ def _require_stabilizing_solution(reduction: ExactReduction, cost: Cost) -> None
             )
 
 
-def _axis_eigenvalues(A: FloatArray, *, right_too: bool) -> list[complex]:
-    """List the eigenvalues on the imaginary axis, to what rounding in A tells, or also right of it.
-
-    Those within rounding of the axis or of zero are moved there, since a double eigenvalue is known to half
-    the digits only.
-    """
-    values, known_to = eigenvalues_and_rounding(A)
-    found = []
-    for value, error in zip(values.tolist(), known_to.tolist(), strict=True):
-        if abs(value) <= error:
-            found.append(0j)
-        elif abs(value.real) <= error:
-            found.append(complex(0.0, value.imag))
-        elif right_too and value.real > 0.0:
-            found.append(value)
-    return found
-
-
-def _unsolved_error(poles: ComplexArray) -> StabilizationError:
-    """Make the refusal where the solver failed although a gain exists."""
+def _unsolved_error(poles: ComplexArray, bound: float | None = None) -> StabilizationError:
+    """Make the refusal where no gain was found although one may exist."""
     worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    known = "" if bound is None else f", known to {bound:.0e} rad/s"
     msg = (
-        f"The solver found no stabilizing gain, although one exists: a pole stays at {_in_words(worst)} rad/s. The "
-        "weights may differ by too many powers of ten; bring Q and R closer together."
+        "The solver found no stabilizing gain, although nothing hides a mode from inputs and cost: a pole stays at "
+        f"{complex_in_words(worst, pair=True)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; "
+        "or the weights differ by too many powers of ten: bring Q and R closer together, or place an actuator where "
+        "the mode moves."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
 
 
-def _null_vector(A: FloatArray, C: FloatArray, eigenvalue: complex) -> ComplexArray | None:
-    """Give a unit vector v with A v = eigenvalue v and C v = 0, if there is one (Hautus' test)."""
-    matrix, scale = balanced_states(A)
-    shown = C * scale
-    size = np.abs(shown).max(axis=1, keepdims=True)
-    shown = shown / np.where(size > 0.0, size, 1.0) * np.linalg.norm(matrix, 2)
-    stack = np.vstack([matrix - eigenvalue * np.eye(A.shape[0]), shown])
-    _, values, right = np.linalg.svd(stack)
-    if values[-1] > UNREACHED * values[0]:
-        return None
-    return np.asarray(scale * right[-1].conj())
+def _inaccurate_error(error: float, poles: ComplexArray) -> StabilizationError:
+    """Make the refusal of a gain with too few digits."""
+    slowest = complex(max(poles.tolist(), key=lambda pole: pole.real))
+    msg = (
+        f"The gain that was found stabilizes, but it is known to {error:.0e} of its size only, where {REFUSED:.0e} is "
+        "needed to call it optimal: rounding of the entries of A, B, Q and R moves it so far. The slowest pole with it "
+        f"is {complex_in_words(slowest, pair=True)} rad/s. An input that hardly reaches a mode, or weights that differ "
+        "by many powers of ten, do this: bring the weights closer together, or actuate the mode."
+    )
+    return StabilizationError(msg, eigenvalue=slowest, quantity="Q, R")
 
 
 def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
@@ -302,16 +345,9 @@ def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
 def _largest_motion(reduction: ExactReduction, mode: ComplexArray) -> tuple[str, str]:
     """Say in the displacement or velocity of which DOF a mode shows most, displacements first."""
     shares = [np.abs(reduction.motion(derivative).X @ mode) for derivative in range(2)]
-    derivative = 0 if shares[0].max() > UNREACHED * shares[1].max() else 1
+    derivative = 0 if shares[0].max() > UNSEEN * shares[1].max() else 1
     return ("displacement", "velocity")[derivative], reduction.model.dofs[int(np.argmax(shares[derivative]))]
 
 
 def _eigenvalues(A: FloatArray) -> ComplexArray:
     return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
-
-
-def _in_words(value: complex) -> str:
-    """Write a pole with four digits, a pair as one."""
-    if abs(value.imag) <= UNREACHED * abs(value):
-        return f"{value.real:.4g}"
-    return f"{value.real:.4g} ± {abs(value.imag):.4g}j"

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Models, systems, gains and responses in and out of files."""

@@ -1,12 +1,11 @@
-"""Named variables from the files that hold several: ``.npz`` archives and MATLAB's ``.mat``, version 5 and 7.3.
+"""Named variables from the files that hold several: ``.npz`` archives, and MATLAB's ``.mat`` of version 4, 5 and 7.3.
 
 A sparse matrix K in an archive is stored by its compressed columns, ``K.data``, ``K.indices``, ``K.indptr`` and
 ``K.shape``; in ``.mat`` it is MATLAB's own. Nothing is unpickled, and sizes are checked before anything is unpacked.
+A ``.npy`` file holds one array, which has no name.
 """
 
-import io
 import os
-import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -14,22 +13,23 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.errors import FileFormatError, naming_the_file
-from halfdof_ctrl.files.formats.mat5 import MOST_BYTES, read_mat
-from halfdof_ctrl.files.formats.mat73 import is_mat73, read_mat73
-from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.mat4 import is_mat4, mat4_variables
+from halfdof_ctrl.files.formats.mat5 import mat5_variables
+from halfdof_ctrl.files.formats.mat73 import is_mat73, mat73_variables
+from halfdof_ctrl.files.formats.npy import SPARSE_PARTS, is_npy, npy_variable, npz_variables
+from halfdof_ctrl.files.formats.variables import Variable
+from halfdof_ctrl.files.naming import naming_the_file
 
 PathLike: TypeAlias = str | os.PathLike[str]
 Content: TypeAlias = Mapping[str, Any]
 
 MATRIX_ENDINGS = (".npz", ".mat")
-ZIP_HEADER = b"PK\x03\x04"
-SPARSE_PARTS = ("data", "indices", "indptr", "shape")
+ARRAY_ENDINGS = (*MATRIX_ENDINGS, ".npy")
 
 
 def ending(path: PathLike, known: Sequence[str]) -> str:
-    """Give the ending of a path in small letters, and refuse one that is not known."""
+    """Return the ending of a path in small letters, and refuse one that is not known."""
     suffix = Path(path).suffix.lower()
     if suffix not in known:
         msg = f"{path}: the ending {suffix or '(none)'} names no format for this. Use {', '.join(known)}."
@@ -45,13 +45,29 @@ def load_variables(path: PathLike, wanted: Sequence[str]) -> Content:
         raise FileFormatError(msg, path=str(path))
     content = Path(path).read_bytes()
     with naming_the_file(path):
-        if is_archive:
-            return _read_npz(content, wanted)
-        return read_mat73(content, wanted) if is_mat73(content) else read_mat(content, wanted)
+        found = variables(content, is_archive=is_archive)
+        return {variable.name: variable.read() for variable in found if variable.name in wanted}
+
+
+def variables(content: bytes, *, is_archive: bool) -> list[Variable]:
+    """Describe the variables of a file: a .npy array, an .npz archive, or MATLAB's of any version.
+
+    Raises
+    ------
+    FileFormatError, ValueError, ...
+        The file is damaged or of another kind.
+    """
+    if is_npy(content):
+        return [npy_variable(content)]
+    if is_archive:
+        return npz_variables(content)
+    if is_mat73(content):
+        return mat73_variables(content)
+    return mat4_variables(content) if is_mat4(content) else mat5_variables(content)
 
 
 def texts(content: Content, key: str) -> list[str] | None:
-    """Give names, which are a text array in .npz and a list of texts from .mat."""
+    """Return names, which are a text array in .npz and a list of texts from .mat."""
     value = content.get(key)
     if value is None or isinstance(value, list):
         return value
@@ -64,7 +80,7 @@ def texts(content: Content, key: str) -> list[str] | None:
 
 
 def single_text(content: Content) -> str | None:
-    """Give the variable ``name``, None if it is empty or not there."""
+    """Return the variable ``name``, None if it is empty or not there."""
     found = texts(content, "name") or [""]
     if len(found) > 1:
         msg = f"name must be one text, but it has {len(found)}."
@@ -73,49 +89,6 @@ def single_text(content: Content) -> str | None:
 
 
 def sparse_parts(key: str, matrix: Any) -> dict[str, Any]:  # noqa: ANN401  # any sparse format
-    """Give the arrays by which an archive stores a sparse matrix."""
+    """Return the arrays by which an archive stores a sparse matrix."""
     columns = csc_array(matrix)
     return {f"{key}.{part}": np.asarray(getattr(columns, part)) for part in SPARSE_PARTS}
-
-
-def _read_npz(content: bytes, wanted: Sequence[str]) -> Content:
-    if not content.startswith(ZIP_HEADER):
-        msg = "this is no archive of arrays. Write it by numpy.savez(path, M=M, C=C, K=K)."
-        raise FileFormatError(msg, path="")
-    archive: Any = np.load(io.BytesIO(content), allow_pickle=False)
-    with archive, zipfile.ZipFile(io.BytesIO(content)) as members:
-        sizes = {info.filename.removesuffix(".npy"): info.file_size for info in members.infolist()}
-        parts = {key: [f"{key}.{part}" for part in SPARSE_PARTS] for key in wanted}
-        sparse = [key for key in wanted if key not in archive.files and set(parts[key]) <= set(archive.files)]
-        full = [key for key in wanted if key in archive.files]
-        too_large = [
-            key for key in (*full, *(part for key in sparse for part in parts[key])) if sizes[key] > MOST_BYTES
-        ]
-        if too_large:
-            msg = (
-                f"{listed(too_large)} is larger than the {MOST_BYTES:.0e} bytes that are read. Reduce the model first."
-            )
-            raise FileFormatError(msg, path="")
-        found = {key: archive[key] for key in full}
-        return found | {key: _sparse(key, *(archive[part] for part in parts[key])) for key in sparse}
-
-
-def _sparse(key: str, data: Any, indices: Any, indptr: Any, shape: Any) -> csc_array:  # noqa: ANN401  # as they come
-    """Make a matrix of parts that may be damaged."""
-    rows, columns = (int(size) for size in shape)
-    sound = (
-        data.ndim == indices.ndim == indptr.ndim == 1
-        and indices.dtype.kind == indptr.dtype.kind == "i"
-        and 0 < rows <= MOST_ROWS
-        and indptr.size == columns + 1
-        and indptr[0] == 0
-        and bool((np.diff(indptr) >= 0).all())
-        and indptr[-1] == data.size == indices.size
-        and bool(((indices >= 0) & (indices < rows)).all())
-    )
-    if not sound:
-        msg = f"the sparse matrix {key} has indices out of bounds. Write it anew."
-        raise FileFormatError(msg, path="")
-    matrix = csc_array((data, indices, indptr), shape=(rows, columns))
-    matrix.sum_duplicates()
-    return matrix

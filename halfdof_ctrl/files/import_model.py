@@ -1,119 +1,143 @@
-"""Models from the files of finite-element programs, and what was found in any model file.
+"""Models from files, and what was found in them.
 
-Matrices come from `femfiles` or from the variables of one file (`containers`); here they become a `SecondOrderModel`,
-and what looks wrong about them becomes a warning.
+Matrices come from `assembly`; here they become a `SecondOrderModel`, and what looks wrong about them becomes a warning.
 """
 
+import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeAlias
 
-import numpy as np
-from scipy.sparse import csc_array, issparse
-
-from halfdof_ctrl.base.arrays import checked_matrix
-from halfdof_ctrl.files.containers import load_variables, texts
+from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.errors import (
+    FileFormatError,
+    ImportedModelWarning,
+    ParameterError,
+    callers_level,
+)
+from halfdof_ctrl.base.names import checked_names
+from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
+from halfdof_ctrl.files.containers import PathLike, single_text, texts
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, MatrixError, callers_level, naming_the_file
-from halfdof_ctrl.files.assembly import ImportedModel, read_matrices, report_on
+from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_report import ImportReport
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
-from halfdof_ctrl.base.names import checked_dofs
-from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, storage, with_triangle
+from halfdof_ctrl.files.naming import naming_the_file
+from halfdof_ctrl.model.law_text import elements_from_stored
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
+Paths: TypeAlias = PathLike | Sequence[PathLike] | Mapping[str, PathLike]
 FACTORIZE_NONE = 0  #: loading a model does not wait for ranks
+NAMES = ("dofs", "inputs", "outputs")
+TRIANGLES = ("lower", "upper")
 
 
 def import_model(
-    given: Sequence[Path] | Mapping[str, Path],
+    path: Paths,
     *,
     triangle: Triangle | None,
     remove_fixed: bool,
-    matrices: Mapping[str, str] | None,
-) -> SecondOrderModel:
-    """Read a model from the files of a finite-element program, see `files.load_model`."""
+    matrices: Mapping[str, str | None] | None,
+) -> SecondOrderModel | NonlinearModel:
+    """Read a model from files, see `models.load_model`."""
+    given = _checked(path, triangle, remove_fixed, matrices)
     found = read_matrices(
         given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=FACTORIZE_NONE
     )
     first = next(iter(given.values())) if isinstance(given, Mapping) else given[0]
     if found.K is None:
-        msg = f"{first}: no stiffness K in {', '.join(found.report.files)}. Give its file, or matrices={{'K': name}}."
+        also = f": {found.holds}" if found.holds else ". Give its file, or matrices={'K': name}"
+        msg = f"{first}: no stiffness K in {', '.join(found.report.files)}{also}."
         raise FileFormatError(msg, path=str(first))
     chosen_by_hand = isinstance(given, Mapping) or len(given) > 1
-    for text in (*found.report.warnings, *([] if chosen_by_hand else _missing(found))):
+    said = tuple(matrices or ())
+    doubts = () if found.own_layout else found.report.warnings  # what save_model wrote is as it was meant
+    for text in (*doubts, *([] if chosen_by_hand else _missing(found, said))):
         warnings.warn(f"{first}: {text}", ImportedModelWarning, stacklevel=callers_level())
     with naming_the_file(first):
-        sparse: dict[str, Any] = {"M": found.M, "C": found.C, "K": found.K, **found.signals}
-        return mechss(**sparse, dofs=found.dofs)
+        return _model(found)
 
 
 def import_report(
-    given: Sequence[Path] | Mapping[str, Path],
+    path: Paths,
     *,
     triangle: Triangle | None,
     remove_fixed: bool,
-    matrices: Mapping[str, str] | None,
+    matrices: Mapping[str, str | None] | None,
     largest: int = LARGEST_COMPONENT,
 ) -> ImportReport:
-    """Look at the files of a finite-element program, see `files.inspect_files`."""
+    """Look at the files of a model, see `models.inspect_files`."""
+    given = _checked(path, triangle, remove_fixed, matrices)
     return read_matrices(given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest).report
 
 
-def container_report(path: Path, *, triangle: Triangle | None, largest: int) -> ImportReport:
-    """Look at the matrices of an .npz or .mat file."""
-    content = load_variables(path, ("M", "C", "K", "dofs"))
-    given = {letter: content[letter] for letter in ("M", "C", "K") if letter in content}
-    if not given:
-        msg = f"{path}: it has none of the matrices M, C, K."
-        raise FileFormatError(msg, path=str(path))
-    with naming_the_file(path):
-        square: dict[str, csc_array] = {}
-        for letter, value in given.items():
-            square[letter] = _square(letter, value, next(iter(square.values())).shape if square else None)
-        n = next(iter(square.values())).shape[0]
-        names = texts(content, "dofs")
-        dofs = tuple([f"q{index}" for index in range(n)]) if names is None else checked_dofs(names, n)
-        return report_on(
-            {letter: filled(letter, matrix, triangle) for letter, matrix in square.items()},
-            dofs,
-            path,
-            labelled=names is not None,
-            largest=largest,
+def _checked(
+    path: Any,  # noqa: ANN401  # what users give
+    triangle: object,
+    remove_fixed: object,
+    matrices: object,
+) -> list[Path] | dict[str, Path]:
+    """Return paths, and refuse options that are none."""
+    if triangle is not None and triangle not in TRIANGLES:
+        msg = f"triangle={triangle!r}, but it is 'lower', 'upper' or None: what files store of a symmetric matrix."
+        raise ParameterError(msg, parameter="triangle", value=triangle)
+    if not isinstance(remove_fixed, bool):
+        msg = f"remove_fixed={remove_fixed!r}, but it is True or False."
+        raise ParameterError(msg, parameter="remove_fixed", value=remove_fixed)
+    sound = matrices is None or (
+        isinstance(matrices, Mapping)
+        and all(isinstance(key, str) and (name is None or isinstance(name, str)) for key, name in matrices.items())
+    )
+    if not sound:
+        msg = f"matrices={matrices!r}, but it is a mapping from letters to names in files, as {{'K': 'kaa', 'C': 'D'}}."
+        raise ParameterError(msg, parameter="matrices", value=matrices)
+    if isinstance(path, str | os.PathLike):
+        return [Path(path)]
+    paths = path.values() if isinstance(path, Mapping) else path if isinstance(path, Sequence) else None
+    if paths is None or not all(isinstance(one, str | os.PathLike) for one in paths):
+        msg = (
+            "load_model and inspect_files take a path, a list of paths, or a mapping as {'K': path, 'M': path}; this "
+            f"is {type(path).__name__}."
         )
+        raise ParameterError(msg, parameter="path", value=path)
+    if not path:
+        msg = "No file is given. Give at least the stiffness."
+        raise FileFormatError(msg, path="")
+    return {letter: Path(one) for letter, one in path.items()} if isinstance(path, Mapping) else [*map(Path, path)]
 
 
-def filled(letter: str, value: Any, triangle: Triangle | None) -> Any:  # noqa: ANN401  # dense or sparse
-    """Complete a matrix of which only this triangle is stored; without a triangle it stays as it is."""
-    if triangle is None or value is None:
-        return value
-    matrix = _square(letter, value, None)
-    raw = RawMatrix(matrix=matrix, format="", declared="unsaid", stored=storage(matrix), completed=False)
-    return with_triangle(raw, triangle).matrix
+def _model(found: ImportedModel) -> SecondOrderModel | NonlinearModel:
+    """Make the model under the names of the files."""
+    names: dict[str, Any] = {key: texts(found.texts, key) for key in NAMES}
+    names["dofs"] = found.dofs or names["dofs"]
+    prescribed = texts(found.texts, "prescribed")
+    matrices: dict[str, Any] = {"M": found.M, "C": found.C, "K": found.K, **found.signals}
+    title = single_text(found.texts)
+    if not prescribed:
+        model = mechss(**matrices, **names, name=title)
+    else:
+        model = _with_prescribed(mechss(**matrices, dofs=names["dofs"], name=title), names, prescribed)
+    model = model if found.known_to == EPS else replace(model, known_to=found.known_to)
+    elements = texts(found.texts, "elements")
+    return nlmechss(model, elements_from_stored(elements)) if elements else model
 
 
-def _square(letter: str, value: Any, shape: tuple[int, ...] | None) -> csc_array:  # noqa: ANN401  # dense or sparse
-    """Check a matrix as `mechss` does, and keep it sparse."""
-    expected = None if shape is None else (shape[0], shape[1])
-    if not issparse(value):
-        return csc_array(checked_matrix(value, letter, expected))
-    matrix: csc_array = csc_array(cast("Any", value))
-    matrix.eliminate_zeros()
-    size = matrix.shape
-    if size[0] != size[1] or size != (expected or size):
-        wanted = "square" if expected is None else f"{expected[0]} x {expected[1]}"
-        msg = f"{letter} must be {wanted}, but it is {size[0]} x {size[1]}."
-        raise MatrixError(msg, matrix=letter)
-    if not np.isfinite(matrix.data).all():
-        msg = f"{letter} has entries that are not finite."
-        raise MatrixError(msg, matrix=letter)
-    return matrix
+def _with_prescribed(model: SecondOrderModel, names: Mapping[str, Any], prescribed: Sequence[str]) -> SecondOrderModel:
+    """Name the signals of a model in which the force on a DOF or its motion may be a direct term."""
+    signals: dict[str, Any] = {
+        key: getattr(model, key) if names[key] is None else checked_names(names[key], len(getattr(model, key)), key)
+        for key in ("inputs", "outputs")
+    }
+    return replace(model, **signals, prescribed=checked_names(prescribed, len(prescribed), "prescribed DOFs"))
 
 
-def _missing(found: ImportedModel) -> list[str]:
+def _missing(found: ImportedModel, said: Sequence[str]) -> list[str]:
     what = {"M": "mass M", "C": "damping C"}
     return [
         f"no {what[letter]} in {', '.join(found.report.files)}, so it is taken as zero."
         for letter in found.report.missing
-        if letter in what
+        if letter in what and letter not in said
     ]

@@ -13,9 +13,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.files.definiteness import Inertia, inertia
-from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.files.definiteness import Inertia, inertia
+from halfdof_ctrl.files.formats.digits import digits_in_words
+from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
 from halfdof_ctrl.files.formats.raw_matrix import Storage
 
 SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
@@ -42,6 +44,7 @@ class MatrixReport:
     inertia: Inertia  #: of the symmetric real part
     notes: tuple[str, ...]
     doubts: tuple[str, ...]  #: what may be wrong with the file
+    known_to: float = EPS  #: relative rounding of the entries by the file's digits
 
     @property
     def symmetry(self) -> str:
@@ -54,8 +57,12 @@ class MatrixReport:
     def rank(self) -> str:
         """Rank and definiteness in words."""
         known = self.inertia.rank
+        rounded = self.letter == "K" and self.known_to > EPS and not self.inertia.negative
+        motions = self.inertia.zero if rounded else 0
+        words = f", {motions} zero to the file's {digits_in_words(self.known_to)}: rigid-body motions"
+        digits = words if motions else ""
         part = "" if self.asymmetry <= SYMMETRIC and not self.is_complex else " (of the symmetric real part)"
-        return self.inertia.in_words + part + ("" if known is None else f", rank {known}")
+        return self.inertia.in_words + part + ("" if known is None else f", rank {known}") + digits
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -67,7 +74,10 @@ class ImportReport:
     n_dofs: int
     labelled: bool  #: whether the files name their DOFs
     missing: tuple[str, ...]  #: letters among M, C, K for which there is no matrix
+    signals: tuple[str, ...]  #: B, F, G, H, D that are read, and from where
     unused: tuple[str, ...]  #: what else is in the files
+    similar: tuple[str, ...]  #: of that, what is as large as the stiffness
+    known_to: float  #: relative rounding of the entries by the digits of the files
     n_inertial: int  #: DOFs whose column of M is not null
     n_half: int  #: of the others, those whose column of C is not null
     n_static: int  #: the rest
@@ -91,10 +101,15 @@ class ImportReport:
         found += [f"{part.source} {doubt}." for part in self.matrices for doubt in part.doubts]
         found += [
             f"{part.letter} ({part.source}) is {part.inertia.in_words}: {part.inertia.negative} eigenvalues of its "
-            "symmetric part are negative."
+            f"symmetric part are negative{_beyond_rounding(part)}."
             for part in self.matrices
             if part.inertia.negative and not part.half_stored
         ]
+        if self.similar:
+            found.append(
+                f"not used: {listed(self.similar)}, as large as the stiffness. If it is the damping, the mass or the "
+                "like, say so: matrices={'C': name}."
+            )
         if self.penalized and not self.removed:
             found.append(
                 f"{len(self.penalized)} DOFs have a stiffness of {PENALTY:.0e} or more, which stands for a boundary "
@@ -112,22 +127,38 @@ class ImportReport:
         return tuple(found)
 
     def __repr__(self) -> str:
-        """Give the table."""
+        """Return the table."""
         names = "named by node and component" if self.labelled else "without names in the files"
         lines = [f"{type(self).__name__}: {self.n_dofs} DOFs, {names}", *_table(self.matrices)]
-        lines += [f"  {letter}  no {WHAT[letter]} in the files: taken as zero" for letter in self.missing]
-        lines.append(f"  DOFs by null columns: {self.n_inertial} inertial, {self.n_half} half, {self.n_static} static")
-        if self.mass:
-            lines.append("  sum of M: " + ", ".join(f"{size:.6g} along {name}" for name, size in self.mass.items()))
+        lines += [f"  {text}" for text in self.signals]
         lines.append(f"  files: {', '.join(self.files)}")
         if self.unused:
             lines.append(f"  not used: {listed(self.unused)}")
         if self.removed:
             lines.append(f"  removed as fixed: {listed(self.removed)}")
+        lines += [f"  {letter}  no {WHAT[letter]} in the files: taken as zero" for letter in self.missing]
+        if self.known_to > EPS:
+            lines.append(f"  entries have {digits_in_words(self.known_to)}: known to {self.known_to:.0e}")
+        lines.append(f"  DOFs by null columns: {self.n_inertial} inertial, {self.n_half} half, {self.n_static} static")
+        if self.mass:
+            lines.append("  sum of M: " + ", ".join(f"{size:.6g} along {name}" for name, size in self.mass.items()))
         lines += [f"  note: {part.letter}: {note}" for part in self.matrices for note in part.notes]
         lines += [f"  note: {note}" for note in self.notes]
         lines += [f"  WARNING: {text}" for text in self.warnings]
         return "\n".join(lines)
+
+
+def _beyond_rounding(part: MatrixReport) -> str:
+    """Say how far below zero the lowest eigenvalue is, where the digits of the file would hide less."""
+    if part.known_to <= EPS:
+        return ""
+    words = f", beyond the rounding of a file with {digits_in_words(part.known_to)}"
+    lowest = part.inertia.lowest
+    return (
+        words
+        if lowest is None
+        else f"{words} (down to {lowest:.1e} of the diagonal, zero being {part.inertia.zero_to:.1e})"
+    )
 
 
 def _table(matrices: Sequence[MatrixReport]) -> list[str]:
@@ -153,7 +184,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
     largest : int
         Components with more rows are not factorized for the rank.
     **found
-        format, stored, completed, half_stored, notes and doubts, as the reader found them.
+        format, stored, completed, half_stored, notes, doubts and known_to, as the reader found them.
     """
     real = csc_array(matrix.real)
     largest_entry = float(np.abs(matrix.data).max(initial=0.0))
@@ -168,7 +199,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
         asymmetry=float(difference.max()) / scale if difference.nnz else 0.0,
         skew=bool(difference.nnz) and float(total.max() if total.nnz else 0.0) <= SYMMETRIC * scale,
         null_columns=int(np.count_nonzero(~has_entries(matrix))),
-        inertia=inertia(real, largest),
+        inertia=inertia(real, largest, found.get("known_to", EPS)),
         **found,
     )
 

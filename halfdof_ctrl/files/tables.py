@@ -1,37 +1,42 @@
-"""Responses as tables: what `files.save_response` writes, under the names of the model."""
+"""Tables in files: responses and gains as rows of text."""
 
+import csv
+import io
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import control
 import numpy as np
 
 from halfdof_ctrl.base.names import name_from_label
+from halfdof_ctrl.design.lqr import StateFeedback
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS, PathLike, ending
+from halfdof_ctrl.files.writing import replacing, save_matrices
+from halfdof_ctrl.systems.phase import response_phase
+
+TABLE_ENDINGS = (".csv",)
+FREQUENCY_HEAD = ("omega [rad/s]", "f [Hz]")  #: first columns of a frequency response
+PARTS = ("real", "imag", "magnitude", "phase [deg]")  #: columns of a channel
+TIME_HEAD = "t [s]"  #: first column of a time response
+GAIN_ENDINGS = (*MATRIX_ENDINGS, *TABLE_ENDINGS)
 
 
 def frequency_table(data: control.FrequencyResponseData) -> tuple[list[str], list[Any]]:
-    """Give the header and the columns: frequencies, and each channel four times."""
+    """Return the header and the columns: frequencies, and each channel four times."""
     omega = np.asarray(data.omega, dtype=float)
-    header, columns = ["omega [rad/s]", "f [Hz]"], [omega, omega / (2.0 * np.pi)]
-    values = np.asarray(data.frdata)
+    header, columns = list(FREQUENCY_HEAD), [omega, omega / (2.0 * np.pi)]
+    values, phase = np.asarray(data.frdata), response_phase(data)
     for i, result in enumerate(data.output_labels):
         for j, cause in enumerate(data.input_labels):
             channel = f"{name_from_label(result)}/{name_from_label(cause)}"
-            header += [f"{channel} {part}" for part in ("real", "imag", "magnitude", "phase [deg]")]
+            header += [f"{channel} {part}" for part in PARTS]
             value = values[i, j]
-            columns += [value.real, value.imag, np.abs(value), np.degrees(_unwrapped(np.angle(value)))]
+            columns += [value.real, value.imag, np.abs(value), np.degrees(phase[i, j])]
     return header, columns
 
 
-def _unwrapped(phase: Any) -> Any:  # noqa: ANN401 - an array of floats, which control leaves untyped
-    """Remove jumps of whole turns, leaving out values at poles, which have no phase."""
-    known = np.isfinite(phase)
-    unwrapped = phase.copy()
-    unwrapped[known] = np.unwrap(phase[known])
-    return unwrapped
-
-
 def time_table(data: control.TimeResponseData) -> tuple[list[str], list[Any]]:
-    """Give the header and the columns: times, and a trace a column."""
+    """Return the header and the columns: times, and a trace a column."""
     time = np.asarray(data.t, dtype=float)
     results = [name_from_label(label) for label in data.output_labels]
     if data.ntraces:
@@ -41,4 +46,55 @@ def time_table(data: control.TimeResponseData) -> tuple[list[str], list[Any]]:
     else:
         header = results
     histories = np.asarray(data.y, dtype=float).reshape(-1, time.size)
-    return ["t [s]", *header], [time, *histories]
+    return [TIME_HEAD, *header], [time, *histories]
+
+
+def save_gain(feedback: StateFeedback, path: PathLike) -> None:
+    """Write the gain K of ``u = -K x`` with the names of its inputs (rows) and states (columns).
+
+    Raises
+    ------
+    FileFormatError
+        The ending is not ``.npz``, ``.mat`` or ``.csv``.
+    OSError
+        The file cannot be written.
+    """
+    if ending(path, GAIN_ENDINGS) not in TABLE_ENDINGS:
+        names = {"inputs": feedback.inputs, "states": feedback.states}
+        save_matrices(path, {"K": np.asarray(feedback.K)}, names, None)
+        return
+    rows = ([name, *map(repr, row)] for name, row in zip(feedback.inputs, feedback.K.tolist(), strict=True))
+    _save_table(path, ["input", *feedback.states], rows)
+
+
+def save_response(data: control.FrequencyResponseData | control.TimeResponseData, path: PathLike) -> None:
+    """Write the numbers of a response as a table with full precision.
+
+    Parameters
+    ----------
+    data : control.FrequencyResponseData or control.TimeResponseData
+        A frequency response gives ``omega [rad/s]``, ``f [Hz]`` and for each channel ``y/F_y`` its real and
+        imaginary part, magnitude, and phase [deg] on the branch of `bode_plot`. A time response gives ``t [s]`` and
+        its outputs, ``y``, or ``y/F_y`` where there is a trace for each input. `load_response` is the way back.
+    path : path-like
+        Ends in ``.csv``. Names are those of the model (``101.1``), not python-control's labels.
+
+    Raises
+    ------
+    FileFormatError
+        Another ending.
+    OSError
+        The file cannot be written.
+    """
+    ending(path, TABLE_ENDINGS)
+    header, columns = time_table(data) if isinstance(data, control.TimeResponseData) else frequency_table(data)
+    _save_table(path, header, (map(repr, row) for row in np.column_stack(columns).tolist()))
+
+
+def _save_table(path: PathLike, header: Sequence[str], rows: Iterable[Iterable[str]]) -> None:
+    with replacing(path) as stream:
+        text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(header)
+        writer.writerows(rows)
+        text.detach()

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""M, C, K and equation (1): names, selection, prescribed motion, evaluation."""

@@ -1,12 +1,13 @@
 """Dense copies of small sparse models, for what works on dense matrices alone."""
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
-from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.base.errors import ComplexModelError, ModelSizeError
+from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
 def dense_copy(model: SecondOrderModel, what: str, remedy: str) -> SecondOrderModel:
-    """Give a model with dense matrices: itself if they are, a copy of a small sparse one.
+    """Return a model with dense matrices: itself if they are, a copy of a small sparse one.
 
     Parameters
     ----------
@@ -37,3 +38,14 @@ def dense_copy(model: SecondOrderModel, what: str, remedy: str) -> SecondOrderMo
         )
         raise ModelSizeError(msg, size=max(n, m, p), limit=LARGEST_DENSE_COPY)
     return model.as_dense()
+
+
+def complex_model_error(model: SecondOrderModel) -> ComplexModelError:
+    """Make the refusal of a real state space for a complex model."""
+    letters = model.complex_matrices
+    msg = (
+        f"{listed(letters)} has imaginary parts (structural damping), which no real state space can represent at all "
+        "frequencies. descriptor_response computes such a model exactly; for a state space replace the loss "
+        "factor eta by a viscous damper, C = eta K / omega at the frequency that matters."
+    )
+    return ComplexModelError(msg, matrices=letters)

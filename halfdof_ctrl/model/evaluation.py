@@ -14,17 +14,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
-from halfdof_ctrl.model.refinement import DataLimit, random_right_side, refined
+from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, random_right_side, refined
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
-SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
-BACKWARD_ERROR = 64 * np.finfo(float).eps  #: componentwise; above it a solution is corrected once
 
 
 def quadratic_transfer(
@@ -68,7 +67,7 @@ def transfer_and_growth(
         with np.errstate(invalid="ignore", over="ignore"):
             right = _polynomial(B, part)
             states, growth[start : start + batch] = _solved(_polynomial(P, part), right)
-            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT).tolist():
+            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT_GROWTH).tolist():
                 exact = ExactPolynomial(P) if exact is None else exact
                 states[k] = _refined(P, exact, complex(part[k]), states[k], right[k])
             response = _polynomial(F, part) @ states + _polynomial(D, part)
@@ -151,14 +150,14 @@ def quadratic_rounding(
             y = np.swapaxes(_solution_size(np.swapaxes(matrix, 1, 2), np.swapaxes(output, 1, 2)), 1, 2)
             bound = y @ (size_P @ x + size_B) + size_F @ x + size_D
         bounds[:, :, start : start + batch] = np.moveaxis(np.nan_to_num(bound, nan=np.inf), 0, 2)
-    return np.asarray(np.finfo(float).eps * bounds)
+    return np.asarray(EPS * bounds)
 
 
 def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
-    """Give the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
+    """Return the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
     columns = _equilibrating_powers(P)[1]
     size = np.abs(_solved(P, B)[0]) / np.swapaxes(columns, 1, 2)
-    return np.asarray((size + np.finfo(float).eps * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
+    return np.asarray((size + EPS * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
 
 
 def _sizes(coefficients: Coefficients, points: ComplexArray) -> FloatArray:
@@ -208,7 +207,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]
     solution = _solve_each(scaled, right)
     residual = right - scaled @ solution
     size = np.abs(scaled) @ np.abs(solution) + np.abs(right)
-    coarse = (np.abs(residual) > BACKWARD_ERROR * size).any(axis=(1, 2))
+    coarse = (np.abs(residual) > CORRECTED_ABOVE * size).any(axis=(1, 2))
     if coarse.any():
         solution[coarse] += _solve_each(scaled[coarse], residual[coarse])
     growth = np.abs(solution[:, :, -1]).max(axis=1, initial=0.0)
@@ -217,7 +216,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]
 
 
 def _equilibrating_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
+    """Return powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
     rows = powers_of_two(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
     return rows, powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
 

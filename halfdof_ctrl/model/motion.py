@@ -24,7 +24,6 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
-from halfdof_ctrl.model.evaluation import Coefficients
 from halfdof_ctrl.base.names import (
     Names,
     as_tuple,
@@ -37,6 +36,7 @@ from halfdof_ctrl.base.names import (
     unknown_name_error,
 )
 from halfdof_ctrl.base.sparse_arrays import has_sparse, joined_sparse
+from halfdof_ctrl.model.evaluation import Coefficients
 
 MotionKind: TypeAlias = Literal["displacement", "velocity", "acceleration"]
 
@@ -127,7 +127,7 @@ def prescribed_signals(model: Named, dof: Names, kind: MotionKind, inputs: Names
 
 
 def places_of_dofs(model: Named, dof: Names) -> tuple[int, ...]:
-    """Give the positions of DOFs whose motion an input can prescribe.
+    """Return the positions of DOFs whose motion an input can prescribe.
 
     Raises
     ------

@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 
-ROUNDS = 8  #: of refinement at most
-ENOUGH = 4 * float(np.finfo(float).eps)  #: a correction below this part of the largest unknown is the last
+REFINEMENT_ROUNDS = 8  #: of refinement at most
+SUSPECT_GROWTH = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
+REFINED_ENOUGH = 4 * EPS  #: a correction below this part of the largest unknown is the last
 SHRINKS = 0.7  #: corrections that do not shrink by this factor lead nowhere: P(s) is singular to rounding
 
 
@@ -58,7 +59,7 @@ def refined(
         The first solution where corrections do not shrink.
     """
     best, last = solution, np.inf
-    for _ in range(ROUNDS):
+    for _ in range(REFINEMENT_ROUNDS):
         correction = solve(exact.residual(s, best, right))
         size = np.abs(best).max(axis=0, initial=0.0)
         share = float((np.abs(correction).max(axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
@@ -67,7 +68,7 @@ def refined(
         if share > 1.0:  # more wrong than right: another start is not worth more
             return solution
         best, last = best + correction, share
-        if share <= ENOUGH:
+        if share <= REFINED_ENOUGH:
             break
     return best
 

@@ -9,56 +9,29 @@ The letters are those of MATLAB's `mechss`. `mechss` is the one door through whi
 it has checked is not checked again. Derivation of all that follows: docs/explanation/reduction.md.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import (
-    DENSE_ROW_LIMIT,
-    MATRIX_DIMENSIONS,
-    ComplexArray,
-    Matrix,
-    checked_matrix,
-    checked_square_matrices,
-    is_complex,
-    read_only,
-)
+from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, EPS, ComplexArray, Matrix, is_complex, read_only
 from halfdof_ctrl.base.errors import ModelSizeError
-from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
-from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
-from halfdof_ctrl.base.names import (
-    DERIVATIVE_SUFFIXES,
-    FORCE_PREFIX,
-    Names,
-    as_tuple,
-    checked_dofs,
-    force_names,
-    listed,
-    picked_places,
-    reconciled_names,
-)
+from halfdof_ctrl.base.names import Names, as_tuple, listed, picked_places
 from halfdof_ctrl.base.sparse_arrays import (
-    MatrixLike,
     as_sparse,
-    checked_sparse_matrix,
-    checked_sparse_squares,
-    filled_rows,
-    has_sparse,
     is_sparse,
     locked,
     picked_below,
     picked_beside,
-    transposed,
-    unit_columns,
     unit_like,
     zeros_like,
 )
+from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
+from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
+from halfdof_ctrl.model.kinds import split_in_words
+from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
-LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -86,6 +59,7 @@ class SecondOrderModel:
     outputs: tuple[str, ...]  #: names of the p outputs
     name: str | None = None  #: name of the model, which the state space takes over
     prescribed: tuple[str, ...] = ()  #: DOFs, here or removed, whose motion is an input (see `prescribe_motion`)
+    known_to: float = EPS  #: relative rounding of the entries of M, C, K; 5e-10 from a file with ten digits
 
     @property
     def is_complex(self) -> bool:
@@ -134,7 +108,7 @@ class SecondOrderModel:
         return squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)
 
     def select(self, inputs: Names = None, outputs: Names = None) -> "SecondOrderModel":
-        """Give the model with other inputs and outputs, picked by name.
+        """Return the model with other inputs and outputs, picked by name.
 
         Parameters
         ----------
@@ -205,8 +179,19 @@ class SecondOrderModel:
         )
         return model.select(new.inputs, new.outputs)
 
+    def as_descriptor(self) -> DescriptorForm:
+        """Give the model as a descriptor system ``E x' = A x + B u``, ``y = C x + D u`` of first order.
+
+        Returns
+        -------
+        DescriptorForm
+            Named tuple (E, A, B, C, D), sparse if the model is, for other tools that take a singular E (DAE,
+            semistate form). How to hand it on: docs/howto/descriptor-systems.md.
+        """
+        return descriptor_form(self)
+
     def as_dense(self) -> "SecondOrderModel":
-        """Give the model with dense matrices: itself if they are.
+        """Return the model with dense matrices: itself if they are.
 
         Raises
         ------
@@ -227,188 +212,21 @@ class SecondOrderModel:
         return replace(self, **dense)
 
     def __repr__(self) -> str:
-        """Give the model on four lines: what it is called, how its DOFs split, its signals."""
+        """Return the model on four lines: what it is called, how its DOFs split, its signals."""
         title = f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
         complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
         prescribed_part = f"\n  motion prescribed: {listed(self.prescribed)}" if self.prescribed else ""
+        rounded_part = f"\n  entries known to {self.known_to:.0e}" if self.known_to > EPS else ""
         return (
-            f"{title}: {len(self.dofs)} DOFs: {_split_in_words(self.M, self.C, self.K)}\n"
+            f"{title}: {len(self.dofs)} DOFs: {split_in_words(self.M, self.C, self.K)}\n"
             f"  dofs:    {listed(self.dofs)}\n"
             f"  inputs:  {listed(self.inputs)}\n"
-            f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}"
+            f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}{rounded_part}"
         )
 
 
-def mechss(
-    M: MatrixLike | None,
-    C: MatrixLike | None,
-    K: MatrixLike | None,
-    B: MatrixLike | None = None,
-    F: MatrixLike | None = None,
-    G: MatrixLike | None = None,
-    *,
-    H: MatrixLike | None = None,
-    D: MatrixLike | None = None,
-    Bv: MatrixLike | None = None,
-    Ba: MatrixLike | None = None,
-    Dv: MatrixLike | None = None,
-    Da: MatrixLike | None = None,
-    dofs: Names = None,
-    inputs: Names = None,
-    outputs: Names = None,
-    name: str | None = None,
-) -> SecondOrderModel:
-    """Create a mechanical model from mass, damping and stiffness.
-
-    Parameters
-    ----------
-    M, C, K : (n, n) array_like, scipy sparse array or matrix, or None
-        Mass [kg], damping [N s/m] and stiffness [N/m]; None for a matrix of zeros, but not all three.
-        They may be singular, unsymmetric or complex (structural damping). If one of them is sparse, the model is: all
-        its matrices are kept in compressed columns, and nothing of n x n entries is ever formed.
-    B : (n, m) array_like or sparse, optional
-        Forces per input [N]; by default a unit force on every DOF, named ``F_<dof>``. A 1D array of
-        length n is one input.
-    F, G, H : (p, n) array_like, optional
-        Displacements, velocities and accelerations in the outputs; without any of them every
-        displacement is an output. A 1D array of length n is one output.
-    D : (p, m) array_like or 0, optional
-        Direct term from the inputs to the outputs.
-    Bv, Ba : (n, m) array_like, optional
-        Forces per first and second derivative of the inputs.
-    Dv, Da : (p, m) array_like, optional
-        Direct terms of the first and second derivative of the inputs.
-    dofs, inputs, outputs : str or sequence of str, optional
-        Names. By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
-        motion ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``, and any other signal ``u[0]``, ``y[0]``, ...
-    name : str, optional
-        Name of the model.
-
-    Returns
-    -------
-    SecondOrderModel
-
-    Raises
-    ------
-    MatrixError
-        A matrix of wrong shape, empty, of things that are no numbers, with NaN or Inf.
-    SignalNameError
-        Names that are too many or too few, twice the same, or that name a DOF's force or motion
-        while the matrices say something else.
-
-    Examples
-    --------
-    A mass of 2 kg on a spring, the spring's far end held by a damper alone:
-
-    >>> model = mechss([[2, 0], [0, 0]], [[0, 0], [0, 5]], [[8, -8], [-8, 8]], dofs=["mass", "joint"])
-    >>> model
-    SecondOrderModel: 2 DOFs: 1 inertial, 1 half, 0 static; 3 states
-      dofs:    mass, joint
-      inputs:  F_mass, F_joint
-      outputs: mass, joint
-    """
-    M, C, K = (checked_sparse_squares if has_sparse((M, C, K)) else checked_square_matrices)((M, C, K), "MCK")
-    n = M.shape[0]
-    names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
-    m = _signals((B, Bv, Ba), axis=1, default=n)
-    p = _signals((F, G, H), axis=0, default=n)
-    every_force = B is None and Bv is None and Ba is None
-    every_displacement = F is None and G is None and H is None
-    input_columns = (
-        unit_like(K, n) if every_force else _checked_or_zero(B, "B", n, m, K),
-        _checked_or_zero(Bv, "Bv", n, m, K),
-        _checked_or_zero(Ba, "Ba", n, m, K),
-    )
-    output_rows = (
-        unit_like(K, n) if every_displacement else _checked_or_zero(F, "F", p, n, K),
-        _checked_or_zero(G, "G", p, n, K),
-        _checked_or_zero(H, "H", p, n, K),
-    )
-    direct = tuple([_checked_or_zero(X, name, p, m, K) for X, name in ((D, "D"), (Dv, "Dv"), (Da, "Da"))])
-    plain_inputs = every_force and inputs is None
-    plain_outputs = every_displacement and outputs is None and D is None and Dv is None and Da is None
-    return SecondOrderModel(
-        M=M,
-        C=C,
-        K=K,
-        B=input_columns[0],
-        Bv=input_columns[1],
-        Ba=input_columns[2],
-        F=output_rows[0],
-        G=output_rows[1],
-        H=output_rows[2],
-        D=direct[0],
-        Dv=direct[1],
-        Da=direct[2],
-        dofs=names,
-        inputs=force_names(names) if plain_inputs else _input_names(inputs, input_columns, names),
-        outputs=names if plain_outputs else _output_names(outputs, output_rows, direct, names),
-        name=name,
-    )
-
-
-def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-    """Tell which columns of M are not null, and which of the others have a column in C that is not."""
-    if is_sparse(M):
-        inertial, damped = (np.diff(as_sparse(X).indptr) > 0 for X in (M, C))
-    else:
-        inertial, damped = (np.logical_or.reduce(X, axis=0) for X in (M, C))
-    return np.asarray(inertial), np.asarray(damped > inertial)
-
-
-def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int:
-    """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
-    for value in given:
-        if value is not None:
-            shape = np.shape(cast("npt.ArrayLike", value))
-            return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
-    return default
-
-
-def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: Matrix) -> Matrix:
-    """Check one matrix, dense or sparse as `like` is."""
-    if value is None or (type(value) in {int, float} and value == 0):
-        return zeros_like(like, rows, columns)
-    return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
-
-
-def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...]) -> tuple[str, ...]:
-    """Name the inputs; a column that is a unit force on a DOF and the name ``F_<dof>`` belong together."""
-    if is_sparse(columns[0]):
-        meaning = unit_columns(columns)
-    else:
-        meaning = [_unit_vectors([matrix[:, j] for matrix in columns]) for j in range(columns[0].shape[1])]
-    found = [FORCE_PREFIX + dofs[hit[1]] if hit is not None and hit[0] == 0 else None for hit in meaning]
-    return reconciled_names(given, found, dofs, "input")
-
-
-def _output_names(
-    given: Names, rows: Sequence[Matrix], direct: Sequence[Matrix], dofs: tuple[str, ...]
-) -> tuple[str, ...]:
-    """Name the outputs; a row that is a DOF's motion and the motion's name belong together."""
-    if is_sparse(rows[0]):
-        meaning, fed = unit_columns([transposed(matrix) for matrix in rows]), filled_rows(direct)
-    else:
-        every = range(rows[0].shape[0])
-        meaning = [_unit_vectors([matrix[i] for matrix in rows]) for i in every]
-        fed = [any(matrix[i].any() for matrix in direct) for i in every]
-    found = [
-        None if hit is None or is_fed else dofs[hit[1]] + DERIVATIVE_SUFFIXES[hit[0]]
-        for hit, is_fed in zip(meaning, fed, strict=True)
-    ]
-    return reconciled_names(given, found, dofs, "output")
-
-
-def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
-    """Find (which vector, which entry) if all entries are zero but a single one that is 1."""
-    places = [(which, int(entry)) for which, vector in enumerate(vectors) for entry in np.flatnonzero(vector)]
-    if len(places) == 1 and vectors[places[0][0]][places[0][1]] == 1:
-        return places[0]
-    return None
-
-
 def _coefficients(model: SecondOrderModel) -> tuple[Coefficients, Coefficients, Coefficients, Coefficients]:
-    """Give the coefficients of 1, s, s^2 in P, B, F and D of equation (1)."""
+    """Return the coefficients of 1, s, s^2 in P, B, F and D of equation (1)."""
     P, B, F = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
     return P, B, F, (model.D, model.Dv, model.Da)
 
@@ -444,17 +262,3 @@ def _with_outputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:
         Dv=picked_below([model.Dv, no_feed], picked),
         Da=picked_below([model.Da, no_feed], picked),
     )
-
-
-def _split_in_words(M: Matrix, C: Matrix, K: Matrix) -> str:
-    """Say how many DOFs are inertial, half and static, and the states that follow."""
-    inertial, half = null_column_kinds(M, C)
-    n, n_inertial, n_half = M.shape[0], int(inertial.sum()), int(half.sum())
-    kinds = f"{n_inertial} inertial, {n_half} half, {n - n_inertial - n_half} static"
-    if n <= LARGEST_RANKED_REPR:
-        M, C, K = (as_sparse(X).toarray() if is_sparse(X) else X for X in (M, C, K))
-        leading = np.where(inertial, M, np.where(half, C, K))
-        size = np.abs(leading).max(axis=0)
-        if not size.all() or np.linalg.matrix_rank(leading / size) < n:
-            return f"{kinds} by null columns, which do not suffice here (see exact_reduction)"
-    return f"{kinds}; {2 * n_inertial + n_half} states"

@@ -1,4 +1,4 @@
-"""Why a pencil is singular: which DOFs its null vectors move and which equations they combine.
+"""Why a pencil is singular: which DOFs its null vectors move, which equations they combine, and the words for it.
 
 This serves the words of a refusal alone, so the reduction and the oracle may both ask; whether a pencil is
 singular each of them decides by itself.
@@ -11,25 +11,58 @@ is a cause of its own.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import Matrix, powers_of_two
-from halfdof_ctrl.model.refusals import Cause, Kind
+from halfdof_ctrl.base.arrays import EPS, Matrix, powers_of_two
+from halfdof_ctrl.base.errors import SingularPencilError
+from halfdof_ctrl.base.names import listed
 
-NULL = 64 * float(np.finfo(float).eps)  #: times the size: singular values below this part of the largest are zero
-SWEEPS = 10  #: of scaling, rows and columns in turns
+Kind: TypeAlias = Literal["unattached", "unused", "floating", "redundant", "free", "empty", "identical", "dependent"]
+CAUSE_WORDS: dict[Kind, str] = {
+    "unattached": "nothing is attached to {names}, no spring, no damper and no mass",
+    "unused": "{names} appears in no equation",
+    "floating": "{names} float as one body that springs and dampers tie to nothing else, and no mass takes part",
+    "redundant": "the constraints of the multipliers {names} are redundant, such as a constraint that stands twice",
+    "free": "{names} can move together in a way that no equation resists",
+    "empty": "the equation of {names} is empty",
+    "identical": "the equations of {names} are identical but for a factor",
+    "dependent": "the equations of {names} are dependent, so that one follows from the others",
+}
+REMEDIES: dict[Kind, str] = {
+    "unattached": "Attach a spring, a damper or a mass to what is loose, or remove it.",
+    "unused": "Attach a spring, a damper or a mass to what is loose, or remove it.",
+    "floating": "Tie what floats to the ground, or give it its mass.",
+    "redundant": "Remove one of the redundant constraints.",
+    "free": "Put the equation that is missing in place of one that follows from others.",
+    "empty": "Put the equation that is missing in place of one that follows from others.",
+    "identical": "Put the equation that is missing in place of one that follows from others.",
+    "dependent": "Put the equation that is missing in place of one that follows from others.",
+}
+MOST_CAUSES = 4  #: causes that a message spells out
+NULL = 64 * EPS  #: times the size: singular values below this part of the largest are zero
+SCALING_SWEEPS = 10  #: of scaling, rows and columns in turns
 NULL_VECTOR_SHARE = 1e-6  #: what has more than this share of a null vector in echelon form takes part in it
-
 Group: TypeAlias = frozenset[int]
-
 SINGLE: tuple[Kind, ...] = ("unattached", "unused", "empty")
 WITH_THEIR_EQUATIONS: tuple[Kind, ...] = ("unattached", "floating", "redundant")
 PAIR = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One independent reason why a pencil is singular, and the DOFs whose unknowns or equations it concerns."""
+
+    kind: Kind
+    names: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """Say it in words."""
+        return CAUSE_WORDS[self.kind].format(names=listed(self.names))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,7 +116,7 @@ def causes(null: NullSpaces, coefficients: Sequence[Matrix], dofs: Sequence[str]
 
 def _scaled(P: Matrix) -> Matrix:
     """Bring the largest entries of rows and columns near one."""
-    for _ in range(SWEEPS):
+    for _ in range(SCALING_SWEEPS):
         P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=1, initial=0.0)))[:, None]
         P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=0, initial=0.0)))
     return P
@@ -126,6 +159,49 @@ def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
 
 
 def _is_constant(columns: Matrix) -> bool:
-    """Tell whether columns of K, C and M on top of each other are dependent, so that a null vector holds at every s."""
+    """Return whether columns of K, C and M on top of each other depend, so that a null vector holds at every s."""
     values = scipy.linalg.svdvals(_scaled(columns))
     return bool(values[-1] <= NULL * max(columns.shape) * values[0])
+
+
+def singular_pencil_error(
+    *, dofs: Sequence[str], equations: Sequence[str], fact: str, causes: Sequence[Cause] = ()
+) -> SingularPencilError:
+    """Make the refusal of a model whose ``det P(s)`` vanishes at every s.
+
+    Parameters
+    ----------
+    dofs : sequence of str
+        DOFs that take part in a motion without force, the support of the right null vectors of P(s).
+    equations : sequence of str
+        Equations that depend on each other, the support of the left null vectors, named by the DOF whose
+        row they are (of a multiplier: its constraint).
+    fact : str
+        What was measured.
+    causes : sequence of Cause, optional
+        Why, as far as it is known.
+
+    Returns
+    -------
+    SingularPencilError
+
+    Examples
+    --------
+    >>> cause = Cause("unattached", ("b",))
+    >>> error = singular_pencil_error(dofs=["b"], equations=["b"], fact="its rank is 1 of 2", causes=[cause])
+    >>> print(error)  # doctest: +NORMALIZE_WHITESPACE
+    The pencil is singular: det P(s) vanishes at every s (its rank is 1 of 2). DOF b can move in any way without a
+    force, and the equation of b says nothing: nothing is attached to b, no spring, no damper and no mass. Attach a
+    spring, a damper or a mass to what is loose, or remove it.
+    """
+    moving = f"DOFs {listed(dofs)} can move together" if len(dofs) > 1 else f"DOF {listed(dofs)} can move"
+    saying = "equations of {} depend on each other" if len(equations) > 1 else "equation of {} says nothing"
+    reasons = [str(cause) for cause in causes[:MOST_CAUSES]]
+    if len(causes) > MOST_CAUSES:
+        reasons.append(f"and {len(causes) - MOST_CAUSES} more such causes")
+    remedies = dict.fromkeys(REMEDIES[cause.kind] for cause in causes) or {"Remove what is redundant or loose.": None}
+    msg = (
+        f"The pencil is singular: det P(s) vanishes at every s ({fact}). {moving} in any way without a force, and the "
+        f"{saying.format(listed(equations))}{': ' if reasons else ''}{'; '.join(reasons)}. {' '.join(remedies)}"
+    )
+    return SingularPencilError(msg, dofs=tuple(dofs), equations=tuple(equations))

@@ -11,39 +11,29 @@ with residuals summed term by term (`exact_products`), and (DATA) says what the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.base.sparse_arrays import (
-    SparseMatrix,
-    as_sparse,
-    column_of_entries,
-    largest_by_row_and_column,
-    times,
-)
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.model.refinement import DataLimit, refined
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
 
 Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
-Pivoting: TypeAlias = tuple[Literal["MMD_AT_PLUS_A", "COLAMD"], float]  #: order, least pivot over the column's largest
 
-WIDTH = 8  #: right-hand sides worked at a time
+
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
-SUSPECT = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
-EPS = float(np.finfo(float).eps)
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
-REFINED = 64 * np.finfo(float).eps  #: componentwise backward error above which a solution is corrected once
-UNSAFE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
-SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
-PIVOTINGS: tuple[Pivoting, ...] = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))
+STRICTER_PIVOTS_ABOVE = 1e-10  #: componentwise backward error of a corrected solution that calls for stricter pivots
 
 
 @limited_threads(1)
@@ -124,31 +114,31 @@ class SparseTransfer:
                 except RuntimeError:  # exactly singular
                     self.growth = np.inf
                     break
-                if backward_error <= UNSAFE or way == len(self.pivotings) - 1:
+                if backward_error <= STRICTER_PIVOTS_ABOVE or way == len(self.pivotings) - 1:
                     value = np.asarray(motion + D.toarray())
                     break
         value[~np.isfinite(value)] = complex(np.inf, np.nan)
         return np.asarray(value.T if self.turned else value)
 
     def _times_solution(self, F: SparseMatrix, B: SparseMatrix, s: complex, way: int) -> tuple[ComplexArray, float]:
-        """Give ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
+        """Return ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
         factors = self._factorized(s, way)
         growth = factors.growth()
         self.growth = max(self.growth, growth)
         left = None
-        if growth > SUSPECT:
+        if growth > SUSPECT_GROWTH:
             self.exact = ExactPolynomial(self.square) if self.exact is None else self.exact
             left = factors.solve_transposed(F[:MOST_BOUNDED].toarray().T)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
-        for start in range(0, B.shape[1], WIDTH):
-            right = B[:, start : start + WIDTH].toarray()
+        for start in range(0, B.shape[1], COLUMNS_AT_A_TIME):
+            right = B[:, start : start + COLUMNS_AT_A_TIME].toarray()
             solution, backward_error = factors.solve(right)
             if left is not None and self.exact is not None:
                 right = np.asarray(right, dtype=np.complex128)
                 solution = refined(self.exact, s, solution, right, lambda residual: factors.solve(residual)[0])
                 self._bound(s, left, solution, start)
-            product[:, start : start + WIDTH] = times(F, solution)
+            product[:, start : start + COLUMNS_AT_A_TIME] = times(F, solution)
             worst = max(worst, backward_error)
         return product, worst
 
@@ -272,12 +262,12 @@ class PointFactors:
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
 
     def solve(self, right: Matrix) -> tuple[ComplexArray, float]:
-        """Give ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
+        """Return ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
         rows, columns = self.pencil.rows, self.pencil.columns
         scaled: ComplexArray = np.asarray((right if rows is None else right[rows]) * self.down, dtype=np.complex128)
         solution: Any = self.lu.solve(scaled)
         residual, backward_error = self._residual(scaled, solution)
-        if backward_error > REFINED:
+        if backward_error > CORRECTED_ABOVE:
             solution += self.lu.solve(residual)
             _, backward_error = self._residual(scaled, solution)
         solution *= self.across
@@ -288,7 +278,7 @@ class PointFactors:
         return back, backward_error
 
     def solve_transposed(self, right: Matrix) -> ComplexArray:
-        """Give ``P(s)^-T right`` for an (n, k) array."""
+        """Return ``P(s)^-T right`` for an (n, k) array."""
         rows, columns = self.pencil.rows, self.pencil.columns
         scaled = np.asarray((right if columns is None else right[columns]) * self.across, dtype=np.complex128)
         solution: Any = cast("Any", self.lu).solve(scaled, trans="T")
@@ -300,7 +290,7 @@ class PointFactors:
         return np.asarray(back)
 
     def growth(self) -> float:
-        """Give the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
+        """Return the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
         right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
         size = float(np.abs(self.lu.solve(right)).max())
         return size if np.isfinite(size) else np.inf
@@ -313,7 +303,7 @@ class PointFactors:
 
 
 def _polynomial(coefficients: Sequence[SparseMatrix], s: complex) -> SparseMatrix:
-    """Give the value of a matrix polynomial, skipping zero coefficients."""
+    """Return the value of a matrix polynomial, skipping zero coefficients."""
     value = csc_array(coefficients[0])
     for power, part in enumerate(coefficients[1:], start=1):
         if part.nnz:

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Mounts and other parts that come as finished models."""

@@ -2,8 +2,34 @@
 
 import math
 
+import numpy as np
+
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.parts.links import Link, linked
+
+SCHEME = """\
+         y  [ m ]
+      +-----+-----+
+      |     |     |
+      |   C_rs   K_v
+     K_r    |     |
+      |    (y1)  (y2)       y1, y2: nodes without mass, half DOFs
+      |     |     |
+      |   K_rs  +-+---+
+      |     |  K_s   C_h
+     -+-----+---+-----+-    ground
+"""  #: of `hydromount`, as the docstring has it
+
+
+def scheme_of(model: SecondOrderModel) -> str | None:
+    """Return the scheme of a model that is the paper's mount; None for any other.
+
+    >>> scheme_of(hydromount()) == SCHEME
+    True
+    """
+    return SCHEME if (model.name, model.dofs) == ("hydromount", ("y", "y1", "y2")) else None
 
 
 def hydromount(
@@ -17,6 +43,19 @@ def hydromount(
     C_h: float = 300.0,
 ) -> SecondOrderModel:
     """Model a hydroelastic engine mount and the mass that it carries.
+
+    ::
+
+             y  [ m ]
+          +-----+-----+
+          |     |     |
+          |   C_rs   K_v
+         K_r    |     |
+          |    (y1)  (y2)       y1, y2: nodes without mass, half DOFs
+          |     |     |
+          |   K_rs  +-+---+
+          |     |  K_s   C_h
+         -+-----+---+-----+-    ground
 
     DOF ``y`` is the mass on top, ``y1`` the node between the damper C_rs and the spring K_rs of the
     rubber, ``y2`` the node between the oil's spring K_v and the lower chamber. ``y1`` and ``y2`` have no
@@ -73,3 +112,52 @@ def hydromount(
         dofs=("y", "y1", "y2"),
         name="hydromount",
     )
+
+
+def hydromount_part(
+    *,
+    m: float = 0.0,
+    K_r: float = 5000.0,
+    K_rs: float = 1000.0,
+    K_v: float = 500.0,
+    K_s: float = 500.0,
+    C_rs: float = 100.0,
+    C_h: float = 300.0,
+) -> SecondOrderModel:
+    """Make the mount of `hydromount` a part between two ports, for `halfdof_ctrl.assemble`.
+
+    Parameters
+    ----------
+    m : float
+        Mass at the top [kg]; none by default, since it is another part.
+    K_r, K_rs, K_v, K_s, C_rs, C_h : float
+        As in `hydromount`, with the paper's values.
+
+    Returns
+    -------
+    SecondOrderModel
+        DOFs ``top`` (y there), ``bottom`` (the ground there), and the half DOFs ``1`` (y1) and ``2`` (y2).
+
+    Raises
+    ------
+    ParameterError
+        As in `hydromount`.
+
+    Examples
+    --------
+    >>> hydromount_part().prescribe_motion("bottom").dofs
+    ('top', '1', '2')
+    """
+    fixed = hydromount(m=m, K_r=K_r, K_rs=K_rs, K_v=K_v, K_s=K_s, C_rs=C_rs, C_h=C_h)
+    sizes = {"K_r": K_r, "K_rs": K_rs, "K_v": K_v, "K_s": K_s, "C_rs": C_rs, "C_h": C_h}
+    ends = {
+        "K_r": ("top", "bottom"),
+        "K_rs": ("1", "bottom"),
+        "K_v": ("top", "2"),
+        "K_s": ("2", "bottom"),
+        "C_rs": ("top", "1"),
+        "C_h": ("2", "bottom"),
+    }
+    links = [Link("K" if key[0] == "K" else "C", *pair, {"": sizes[key]}) for key, pair in ends.items()]
+    part = linked(("top", "bottom", "1", "2"), links, ("",), "hydromount")
+    return mechss(np.diag([m, 0.0, 0.0, 0.0]), part.C, part.K, dofs=part.dofs, name=fixed.name)

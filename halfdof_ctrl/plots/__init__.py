@@ -8,6 +8,7 @@ says of it is an open black circle; where the descriptor form stands alone it is
 
 from halfdof_ctrl.plots.bode import bode_plot
 from halfdof_ctrl.plots.pole_map import pole_map_plot
+from halfdof_ctrl.plots.prony import prony_plot
 from halfdof_ctrl.plots.step import step_plot
 from halfdof_ctrl.plots.stiffness import dynamic_stiffness_plot, transmissibility_plot
 from halfdof_ctrl.plots.sweep import sweep_plot
@@ -16,6 +17,7 @@ __all__ = [
     "bode_plot",
     "dynamic_stiffness_plot",
     "pole_map_plot",
+    "prony_plot",
     "step_plot",
     "sweep_plot",
     "transmissibility_plot",

@@ -4,7 +4,7 @@ A signal's unit follows from the model: a DOF's displacement is in m, its deriva
 force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
 import control
@@ -16,33 +16,24 @@ from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
 from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.names import name_from_label
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import (
-    MOST_CACHED,
-    force_names,
-    motion_names,
-    name_from_label,
-    physical_places,
-    reaction_names,
-    unknown_name_error,
-)
+from halfdof_ctrl.plots.units import plain
 
 AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
 AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
-Units: TypeAlias = Mapping[str, str] | None
-
 FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
 LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
 LEGEND_SIZE = 9.0  #: [pt]
+USUAL_POINTS = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
 LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
 CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
-FORCE_UNITS = {"m": "N", "mm": "N", "rad": "N m", "m^3": "Pa"}  #: of the force on a DOF, by the DOF's unit
 
 
 def prepared_axes(
     ax: AxesLike, shape: tuple[int, int], what: str, *, height: float, ratios: Iterable[float] | None = None
 ) -> AxesArray:
-    """Give an array of axes of the wanted shape: the given ones, or those of a new figure.
+    """Return an array of axes of the wanted shape: the given ones, or those of a new figure.
 
     Parameters
     ----------
@@ -83,7 +74,7 @@ def prepared_axes(
 
 
 def no_lines(axes: AxesArray) -> npt.NDArray[Any]:
-    """Give an empty list for each of the axes."""
+    """Return an empty list for each of the axes."""
     lines = np.empty(axes.shape, dtype=object)
     for place in np.ndindex(axes.shape):
         lines[place] = []
@@ -129,7 +120,7 @@ def require_system(sysdata: object) -> None:
 
 
 def legend_prefix(label: str | None) -> str:
-    """Give what stands before the entries of a system in the legend."""
+    """Return what stands before the entries of a system in the legend."""
     return f"{plain(label)}: " if label else ""
 
 
@@ -137,6 +128,27 @@ def label_y(ax: Axes, text: str) -> None:
     """Label the y axis, but keep a label that says the same and more (the unit, from a model drawn before)."""
     if not ax.get_ylabel().startswith(text):
         ax.set_ylabel(text)
+
+
+def usual_largest(ax: Axes, part: float) -> float:
+    """Return the size that a part of the width of a plot stays below, for all its curves with positive values.
+
+    Points weigh by the width between them, since grids are dense at resonances.
+    """
+    sizes, widths = [], []
+    for line in ax.get_lines():
+        x, y = (np.asarray(data, dtype=float) for data in (line.get_xdata(), line.get_ydata()))
+        places = np.log(x, where=x > 0.0, out=np.full(x.size, np.nan))
+        width = np.abs(np.gradient(places)) if x.size > 1 else np.ones(x.size)
+        sound = np.isfinite(y) & (y > 0.0)
+        sizes.append(y[sound])
+        widths.append(np.nan_to_num(width[sound]))
+    every, weights = np.concatenate(sizes), np.concatenate(widths)
+    order = np.argsort(every)
+    total = np.cumsum(weights[order])
+    if total.size == 0 or total[-1] <= 0.0:
+        return float(every.max(initial=0.0))
+    return float(every[order][np.searchsorted(total, part * total[-1])])
 
 
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:
@@ -189,109 +201,6 @@ def draw_title(axes: AxesArray, title: str, *, own: bool) -> None:
     else:
         legend = axes[0, 0].get_legend()
         axes[0, 0].set_title(title, fontsize="medium", pad=6.0 if legend is None else 14.0 * _legend_rows(legend) + 8.0)
-
-
-def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> dict[str, str]:
-    """Give the units of the signals that have one, by name.
-
-    Parameters
-    ----------
-    system : control.StateSpace or SecondOrderModel
-    units : mapping from name to unit, optional
-        For a DOF the unit of its displacement, from which those of its derivatives and its force follow;
-        for any other signal its own.
-
-    Raises
-    ------
-    SignalNameError
-        A unit for a signal that the system does not have.
-    """
-    given = dict(units or {})
-    known: dict[str, str | None] = {}
-    if isinstance(system, SecondOrderModel):
-        names: set[str] = {*system.inputs, *system.outputs}
-        dofs = tuple(dict.fromkeys((*system.dofs, *system.prescribed)))
-        if len(dofs) > MOST_CACHED:
-            dofs = _concerned({*names, *given}, dofs)
-        for dof, *motions, force in zip(
-            dofs, *(motion_names(dofs, k) for k in range(3)), force_names(dofs), strict=True
-        ):
-            unit = given.get(dof, "m")
-            known |= dict(zip(motions, (unit, f"{unit}/s", f"{unit}/s^2"), strict=True))
-            known[force] = FORCE_UNITS.get(unit)
-            if dof in system.prescribed:
-                known[reaction_names((dof,))[0]] = FORCE_UNITS.get(unit)
-    else:
-        names = {name for side in signal_names(system) for name in side}
-    for name in given:
-        if name not in names and name not in known:
-            raise unknown_name_error(name, "signal", sorted(names | set(known)))
-    return {name: unit for name, unit in (known | given).items() if unit}
-
-
-def _concerned(names: set[str], dofs: tuple[str, ...]) -> tuple[str, ...]:
-    """Give the DOFs that some of the names are forces on or motions of."""
-    places = {place % len(dofs) for place in physical_places(names, dofs, "output").values()}
-    return tuple([dofs[place] for place in sorted(places.union(physical_places(names, dofs, "input").values()))])
-
-
-def signal_names(system: control.StateSpace | SecondOrderModel) -> tuple[list[str], list[str]]:
-    """Give the names of the outputs and of the inputs, as the model has them."""
-    if isinstance(system, SecondOrderModel):
-        return list(system.outputs), list(system.inputs)
-    outputs, inputs = (
-        [name_from_label(label) for label in labels] for labels in (system.output_labels, system.input_labels)
-    )
-    return outputs, inputs
-
-
-def signal_label(name: str, units: Mapping[str, str]) -> str:
-    """Write a signal with its unit, as far as it is known.
-
-    >>> signal_label("y_ddot", {"y_ddot": "m/s^2"})
-    'y_ddot [m/s²]'
-    """
-    return plain(name) + (f" [{typeset(units[name])}]" if name in units else "")
-
-
-def ratio_label(output: str, source: str, units: Mapping[str, str], *, dB: bool, newline: bool) -> str:
-    """Write the magnitude of a transfer function with its unit.
-
-    >>> ratio_label("y_dot", "F_y", {"y_dot": "m/s", "F_y": "N"}, dB=False, newline=False)
-    '|y_dot/F_y| [(m/s)/N]'
-    """
-    unit = ratio_unit(output, source, units)
-    if dB:
-        unit = f"dB re 1 {unit}" if unit not in {"", "-"} else "dB"
-    return f"|{plain(output)}/{plain(source)}|" + (("\n" if newline else " ") + f"[{unit}]" if unit else "")
-
-
-def ratio_unit(output: str, source: str, units: Mapping[str, str]) -> str:
-    """Write the unit of a ratio of two signals, as far as it is known.
-
-    >>> ratio_unit("F_phi", "phi", {"F_phi": "N m", "phi": "rad"})
-    '(N m)/rad'
-    """
-    if output not in units or source not in units:
-        return ""
-    over, under = units[output], units[source]
-    over = f"({over})" if set(over) & set("/ ") else over
-    under = f"({under})" if set(under) & set("/ ") else under
-    return "-" if over == under else typeset(f"{over}/{under}")
-
-
-def plain(name: str) -> str:
-    """Write a name so that matplotlib does not read it as mathematics."""
-    return name.replace("$", r"\$")
-
-
-def typeset(unit: str) -> str:
-    """Write powers in a unit as superscripts.
-
-    >>> typeset("m/s^2")
-    'm/s²'
-    """
-    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def _legend_rows(legend: Legend) -> int:

@@ -11,52 +11,44 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
+from halfdof_ctrl.base.errors import (
+    NoStateSpaceError,
+    ParameterError,
+)
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     CIRCLE,
     AxesArray,
     AxesLike,
-    Units,
     draw_grid,
     finished_plot,
-    known_units,
     label_y,
     legend_prefix,
     no_lines,
-    plain,
     prepared_axes,
-    ratio_label,
     require_system,
-    signal_names,
+    usual_largest,
 )
-from halfdof_ctrl.descriptor.structure import require_regular
-from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    HalfdofError,
-    ImproperError,
-    ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
+from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
+from halfdof_ctrl.systems.frequency import (
+    descriptor_response,
+    frequency_response,
+    has_many_states,
 )
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response, has_many_states
+from halfdof_ctrl.systems.phase import response_phase
+from halfdof_ctrl.systems.sampled_phase import on_branch
 from halfdof_ctrl.systems.state_space import mech2ss
 
 MARKS = 19  #: markers spread over the frequencies
 PEAK_MARKS = 6  #: markers on the highest peaks besides
-CLOSE = 0.05  #: relative distance between frequencies below which one marker does for two peaks
-HALF_TURN = 1e-6  #: [rad] a jump of the phase this close to pi comes from an undamped pole or zero
+ONE_MARKER = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
-USUAL = 95.0  #: [%] of the points of a curve lie in the range that is shown in any case
-FLAT = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
-ROOM = 5.0  #: ... and gets this factor above and below
-SPIKE = 1e5  #: a peak higher than this times that range is cut
-NO_STATE_SPACE: dict[type[HalfdofError], str] = {
-    ComplexModelError: "model is complex",
-    ImproperError: "improper",
-    SingularLeadingMatrixError: "W is singular",
-    UncertainRankError: "order uncertain",
-}
+USUAL_WIDTH = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
+FLAT_RATIO = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
+FLAT_ROOM = 5.0  #: ... and gets this factor above and below
+RESONANCE_SPIKE = 1e5  #: a peak higher than this times that range is cut
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,16 +60,16 @@ class Scales:
     deg: bool
 
     def frequency(self, omega: FloatArray) -> FloatArray:
-        """Give frequencies as they are drawn."""
+        """Return frequencies as they are drawn."""
         return omega / (2.0 * np.pi) if self.Hz else omega
 
     def magnitude(self, values: ComplexArray) -> FloatArray:
-        """Give magnitudes as they are drawn."""
+        """Return magnitudes as they are drawn."""
         with np.errstate(divide="ignore"):
             return np.asarray(20.0 * np.log10(np.abs(values)) if self.dB else np.abs(values))
 
     def phase(self, angle: FloatArray) -> FloatArray:
-        """Give an angle [rad] as it is drawn."""
+        """Return an angle [rad] as it is drawn."""
         return np.degrees(angle) if self.deg else angle
 
 
@@ -100,9 +92,9 @@ def bode_plot(
     Parameters
     ----------
     sysdata : control.StateSpace or SecondOrderModel
-        The curve is `frequency_response` of the state space, for a model that of `mech2ss` of it. Where a
-        model has none (complex, improper, order uncertain, more than 1000 states of a sparse model) the curve is its
-        descriptor form, and the legend says so.
+        The curve is `frequency_response` of it, for a model in the states that keep most digits. Where a
+        model has no state space (complex, improper, order uncertain, more than 1000 states of a sparse model) the curve
+        is its descriptor form, and the legend says so.
     omega : (k,) array_like, optional
         Frequencies [rad/s], the very points (two are two points, not limits); also with `Hz`. By default a
         grid around the poles.
@@ -143,8 +135,8 @@ def bode_plot(
 
     Notes
     -----
-    The phase starts between -180 and 180 degrees and has no jumps; across an undamped pole it falls and
-    across an undamped zero it rises, as with vanishing damping.
+    The phase is on the branch that poles and zeros of the model give, on any grid: across an undamped pole it falls
+    and across an undamped zero it rises, as with vanishing damping. See `systems.phase`.
 
     Examples
     --------
@@ -159,7 +151,7 @@ def bode_plot(
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     lines, scales, prefix = no_lines(axes), Scales(dB, Hz, deg), legend_prefix(label)
-    values, marks = np.asarray(curve.frdata), _marked(curve)
+    values, marks, phases = np.asarray(curve.frdata), _marked(curve), response_phase(curve)
     exact = (
         None
         if reference is None or marks.size == 0
@@ -167,7 +159,7 @@ def bode_plot(
     )
     for i, j in product(range(p), range(m)):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
-        phase = continuous_phase(values[i, j])
+        phase = phases[i, j]
         x = scales.frequency(curve.omega)
         style: dict[str, Any] = {"label": prefix + kind, "linewidth": 1.5}
         lines[2 * i, j] += above.plot(x, scales.magnitude(values[i, j]), **style)
@@ -175,67 +167,30 @@ def bode_plot(
         if exact is not None:
             style = {"label": prefix + "descriptor form", "markersize": 5.0, **CIRCLE}
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
-            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(_on_branch(exact[i, j], phase[marks])), **style)
+            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase[marks])), **style)
     named = sysdata if reference is None else reference
     dress_bode(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 
-def continuous_phase(values: ComplexArray) -> FloatArray:
-    """Give the phase [rad] of a frequency response without jumps, NaN where there is none.
-
-    Parameters
-    ----------
-    values : (k,) complex ndarray
-        At rising frequencies.
-
-    Returns
-    -------
-    (k,) ndarray
-        ``numpy.angle`` plus whole turns. The first value lies in [-pi, pi], a negative real one at pi
-        where the magnitude rises (a zero at the origin), else at -pi; a half turn is taken downwards
-        where the magnitude rises into it (an undamped pole), else upwards (a zero).
-
-    Examples
-    --------
-    >>> continuous_phase(np.array([1.0, 2.0, -2.0, -1.0, 1.0])).round(3).tolist()
-    [0.0, 0.0, -3.142, -3.142, 0.0]
-    """
-    angle = np.where((values == 0.0) | ~np.isfinite(values), np.nan, np.angle(values))
-    there = np.flatnonzero(~np.isnan(angle))
-    if there.size == 0:
-        return angle
-    known, size = angle[there], np.abs(values[there])
-    if np.pi - np.abs(known[0]) < HALF_TURN and (known[0] > 0.0) != (size[1:2] > size[0]).any():
-        known[0] = -known[0]
-    jumps = np.mod(np.diff(known) + np.pi, 2.0 * np.pi) - np.pi
-    half = np.pi - np.abs(jumps) < HALF_TURN
-    rising = np.diff(size[:-1], prepend=0.0) >= 0.0
-    jumps += 2.0 * np.pi * ((half & ~rising & (jumps < 0.0)) * 1.0 - (half & rising & (jumps > 0.0)) * 1.0)
-    unwrapped = known[0] + np.concatenate([[0.0], np.cumsum(jumps)])
-    phase = angle.copy()
-    phase[there] += 2.0 * np.pi * np.round((unwrapped - angle[there]) / (2.0 * np.pi))
-    return phase
-
-
 def _curve(
     sysdata: control.StateSpace | SecondOrderModel, omega: npt.ArrayLike | None, reference: SecondOrderModel | None
 ) -> tuple[control.FrequencyResponseData, str, SecondOrderModel | None]:
-    """Give the curve, what it is, and the model that the markers come from."""
+    """Return the curve, what it is, and the model that the markers come from."""
     require_system(sysdata)
     if isinstance(sysdata, SecondOrderModel):
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
-            sys = mech2ss(sysdata)
-        except tuple(NO_STATE_SPACE) as error:
-            kind = f"descriptor form (no state space: {NO_STATE_SPACE[type(error)]})"
+            mech2ss(sysdata)
+        except NoStateSpaceError as refusal:
+            kind = f"descriptor form (no state space: {refusal.why})"
             return descriptor_response(sysdata, omega), kind, reference
+        curve = frequency_response(sysdata, omega)
         if reference is None and not (sysdata.is_sparse and len(sysdata.dofs) > LARGEST_DENSE_COPY):
             reference = sysdata
     else:
-        sys = sysdata
-    curve = frequency_response(sys, omega)
+        curve = frequency_response(sysdata, omega)
     if reference is not None:
         size = (curve.noutputs, curve.ninputs)
         if not isinstance(reference, SecondOrderModel) or reference.D.shape != size:
@@ -263,16 +218,10 @@ def _marked(curve: control.FrequencyResponseData) -> npt.NDArray[np.intp]:
     peaks = np.where((inner > size[:, :-2]) & (inner > size[:, 2:]), inner, 0.0).max(axis=0)
     highest: list[int] = []
     for k in (1 + np.argsort(-peaks, kind="stable")[: np.count_nonzero(peaks)]).tolist():
-        if len(highest) < PEAK_MARKS and all(abs(frequencies[k] - frequencies[other]) > CLOSE for other in highest):
+        apart = all(abs(frequencies[k] - frequencies[other]) > ONE_MARKER for other in highest)
+        if apart and len(highest) < PEAK_MARKS:
             highest.append(k)
     return np.asarray(usable[np.union1d(spread, np.array(highest, dtype=np.intp))])
-
-
-def _on_branch(values: ComplexArray, phase: FloatArray) -> FloatArray:
-    """Give the phase of values on the turn nearest to a given one."""
-    angle = np.where(values == 0.0, np.nan, np.angle(values))
-    turns = np.round((phase - angle) / (2.0 * np.pi))
-    return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
 
 
 def dress_bode(
@@ -311,12 +260,12 @@ def _set_logarithmic(ax: Axes) -> None:
     curve = curve[np.isfinite(curve) & (curve > 0.0)]
     if curve.size == 0:
         return
-    if curve.max() <= FLAT * curve.min():
-        ax.set_ylim(curve.min() / ROOM, curve.max() * ROOM)
+    if curve.max() <= FLAT_RATIO * curve.min():
+        ax.set_ylim(curve.min() / FLAT_ROOM, curve.max() * FLAT_ROOM)
     ax.set_yscale("log")
-    usual = float(np.percentile(curve, USUAL))
-    if ax.dataLim.y1 > SPIKE * usual:
-        ax.set_ylim(top=np.sqrt(SPIKE) * usual)
+    usual = usual_largest(ax, USUAL_WIDTH)
+    if ax.dataLim.y1 > RESONANCE_SPIKE * usual:
+        ax.set_ylim(top=np.sqrt(RESONANCE_SPIKE) * usual)
 
 
 def _set_phase_ticks(ax: Axes) -> None:

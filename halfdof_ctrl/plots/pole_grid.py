@@ -14,12 +14,14 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-WIDE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
-AT_ORIGIN = 1e-7  #: points below this part of the largest |s| do not decide on that
+WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
+FAR = 20.0  #: times all others, those that swing among them: a point so far out gets logarithmic axes too
+LOGARITHMIC_LABELS = (1e-3, 1e4)  #: numbers outside are written with a power of ten
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
-APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+DISCRETE_RATIOS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
+LABELS_APART = 0.13  #: distance between labels of damping ratios, as part of the axes
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
-SAME = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
+SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -32,15 +34,15 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
         points = np.concatenate([points, [-1.0, 1.0, 1.0j, -1.0j]])
     size = np.abs(points)
     largest = float(size.max(initial=0.0)) or 1.0
-    smallest = float(size[size > AT_ORIGIN * largest].min(initial=largest))
+    smallest = float(size[size > 0.0].min(initial=largest))
     left, right = float(points.real.min(initial=0.0)), float(points.real.max(initial=0.0))
     height = float(np.abs(points.imag).max(initial=0.0))
-    if largest > WIDE * smallest and not discrete:
+    if not discrete and (largest > WIDE_PLANE * smallest or _is_squeezed(points)):
         linear = 10.0 ** np.floor(np.log10(smallest))
         for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
             set_scale("symlog", linthresh=linear)
             locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
-            locator.set_params(numticks=9)
+            locator.set_params(numticks=6 if axis is ax.xaxis else 9)
             axis.set_major_locator(locator)
         ax.set_xlim(min(8.0 * left, -10.0 * linear), max(8.0 * right, linear))
         top = max(8.0 * height, 10.0 * linear)
@@ -49,6 +51,13 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
         ax.set_xlim(min(left - 0.18 * width, -0.7 * width), right + 0.18 * width)
         top = 1.2 * max(height, 0.35 * width)
     ax.set_ylim(-top, top)
+
+
+def _is_squeezed(points: npt.NDArray[np.complexfloating]) -> bool:
+    """Tell whether a point far out would leave those that swing no room on linear axes."""
+    swinging = np.abs(points[points.imag != 0.0])
+    near = swinging[swinging * FAR < np.abs(points).max(initial=0.0)]
+    return bool(near.size > 0)
 
 
 def draw_pole_grid(ax: Axes) -> None:
@@ -60,7 +69,7 @@ def draw_pole_grid(ax: Axes) -> None:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
         inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
         end = inside[-1] if inside.size else last
-        if np.hypot(*(end - last)) < APART or np.hypot(*(end - (0.0, 0.5))) < APART:
+        if np.hypot(*(end - last)) < LABELS_APART or np.hypot(*(end - (0.0, 0.5))) < LABELS_APART:
             continue
         last = end
         _draw_mirrored(ax, ray)
@@ -73,19 +82,40 @@ def draw_pole_grid(ax: Axes) -> None:
         arc = radius * np.exp(1j * angles)
         path = _axes_coordinates(ax, arc.conj())[_inside(ax, arc)]
         length = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(path, axis=0).T))])
-        if length[-1] > APART:
+        if length[-1] > LABELS_APART:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
-            if np.hypot(*(middle - last)) > APART and middle[0] > EDGE:
+            if np.hypot(*(middle - last)) > LABELS_APART and middle[0] > EDGE:
                 ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
                 last = middle
 
 
+def draw_discrete_grid(ax: Axes) -> None:
+    """Draw and label lines of equal damping ratio and of equal natural frequency in the z-plane.
+
+    z = exp(s dt) with s dt = r (-zeta + j sqrt(1 - zeta^2)), up to the Nyquist frequency.
+    """
+    for zeta in DISCRETE_RATIOS:
+        top = np.pi / np.sqrt(1.0 - zeta**2)
+        ray = np.exp(np.linspace(0.0, top, 300) * complex(-zeta, np.sqrt(1.0 - zeta**2)))
+        _draw_mirrored(ax, ray)
+        place = ray[np.searchsorted(np.linspace(0.0, top, 300), 0.42 * top)]
+        ax.text(place.real, place.imag, f"{zeta:g}", **CENTRED, **TEXT)
+    decay = np.linspace(0.0, 1.0, 200)
+    for tenth in range(1, 11):
+        angle = 0.1 * tenth * np.pi
+        arc = np.exp(angle * (-decay + 1j * np.sqrt(1.0 - decay**2)))
+        _draw_mirrored(ax, arc)
+        if tenth % 2 == 0 and tenth < 10:  # noqa: PLR2004  # the last one lies on the real axis
+            edge = 1.09 * arc[0]
+            ax.text(edge.real, edge.imag, f"{0.1 * tenth:.1f}π/T", **CENTRED, **TEXT)
+
+
 def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:
-    """Write the multiplicity beside points that coincide up to rounding."""
-    left, near_origin = points, AT_ORIGIN * np.abs(points).max(initial=0.0)
+    """Write the multiplicity beside points that coincide up to rounding; poles at the origin are exact zeros."""
+    left = points
     while left.size:
-        same = np.abs(left - left[0]) <= SAME * np.abs(left[0]) + near_origin
+        same = np.abs(left - left[0]) <= SAME_POLE * np.abs(left[0])
         if np.count_nonzero(same) > 1:
             ax.annotate(
                 f"{np.count_nonzero(same)}x",
@@ -108,9 +138,17 @@ def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:
 
 
 def _number(value: float) -> str:
-    """Write a number, from 10^4 as a power of ten."""
-    exponent = round(np.log10(value))
-    return f"{value:g}" if -4 < exponent < 4 else rf"$10^{{{exponent}}}$"  # noqa: PLR2004
+    r"""Write a number with its mantissa, large and small ones with a power of ten.
+
+    >>> [_number(value) for value in (250.0, 8e4, 1e5)]
+    ['250', '$8 \\times 10^{4}$', '$10^{5}$']
+    """
+    if LOGARITHMIC_LABELS[0] <= value < LOGARITHMIC_LABELS[1]:
+        return f"{value:g}"
+    mantissa, exponent = f"{value:.3e}".split("e")
+    factor = f"{float(mantissa):g}"
+    power = rf"10^{{{int(exponent)}}}"
+    return f"${power}$" if factor == "1" else rf"${factor} \times {power}$"
 
 
 def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:
@@ -119,7 +157,7 @@ def _draw_mirrored(ax: Axes, points: npt.NDArray[np.complexfloating]) -> None:
 
 
 def _axes_coordinates(ax: Axes, points: npt.NDArray[np.complexfloating]) -> FloatArray:
-    """Give where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
+    """Return where points of the s-plane are drawn, (0, 0) and (1, 1) being the corners of the axes."""
     return np.asarray((ax.transScale + ax.transLimits).transform(np.column_stack([points.real, points.imag])))
 
 

@@ -4,26 +4,35 @@ from typing import Any, TypeAlias
 
 import control
 import numpy as np
-import scipy.linalg
 from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
-from halfdof_ctrl.descriptor.structure import pencil_structure, zeros
-from halfdof_ctrl.design.lqr import StateFeedback
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, UncertainRankError
-from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.descriptor.finite_part import finite_part
-from halfdof_ctrl.plots.pole_grid import draw_pole_grid, mark_multiple, set_pole_axes
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.descriptor.zeros import zeros
+from halfdof_ctrl.design.lqr import StateFeedback
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
+from halfdof_ctrl.plots.pole_grid import draw_discrete_grid, draw_pole_grid, mark_multiple, set_pole_axes
+from halfdof_ctrl.systems.origin import poles_of_model
+from halfdof_ctrl.systems.pole_bounds import bounded_poles
+from halfdof_ctrl.systems.working_states import working_matrix
 
 Mark: TypeAlias = tuple[ComplexArray, str, dict[str, Any]]
 
 NONE = np.zeros(0, dtype=np.complex128)
 CROSS: dict[str, Any] = {"marker": "x", "color": "C0", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
 RING: dict[str, Any] = {"marker": "o", "color": "black", "markersize": 13.0, "markerfacecolor": "none", "zorder": 2.9}
-ZERO: dict[str, Any] = {"marker": "D", "color": "C2", "markersize": 5.0, "markerfacecolor": "white", "zorder": 2.8}
+ZERO_MARK: dict[str, Any] = {
+    "marker": "D",
+    "color": "C2",
+    "markersize": 8.0,
+    "markeredgewidth": 1.5,
+    "markerfacecolor": "none",
+    "zorder": 3.1,  # hollow and above crosses and rings, so that neither hides the other
+}
 CLOSED: dict[str, Any] = {**CROSS, "color": "C3"}
 NOTHING: dict[str, Any] = {"marker": "", "color": "none"}
 
@@ -49,7 +58,7 @@ def pole_map_plot(
         A design of `lqr`, whose closed-loop poles are drawn beside.
     ax : Axes, optional
     grid : bool
-        Draw lines of equal damping ratio and of equal natural frequency (continuous time only).
+        Draw lines of equal damping ratio and of equal natural frequency.
     title, label : str, optional
         As in `bode_plot`.
 
@@ -57,7 +66,8 @@ def pole_map_plot(
     -------
     control.ControlPlot
         ``lines[0, 0]`` holds the markers in the order of the legend, without the grid. The axes are
-        logarithmic (symlog) where the moduli span more than three decades.
+        logarithmic (symlog) where the moduli span more than three decades, or where a fast point would leave those that
+        swing no room.
 
     Raises
     ------
@@ -105,11 +115,14 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
         marks = [
             *_poles_of_A(sysdata, closed),
             (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
-            (zeros(sysdata), "zeros", ZERO),
+            (zeros(sysdata), "zeros", ZERO_MARK),
             (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NOTHING),
         ]
     else:
-        marks = [(np.asarray(sysdata.poles()), f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO)]
+        poles = bounded_poles(np.asarray(sysdata.A, dtype=float)).values
+        if sysdata.isdtime(strict=True):
+            poles = np.asarray(sysdata.poles())
+        marks = [(poles, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
     if feedback is not None:
         marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
     return [mark for mark in marks if mark[0].size or mark[2] is NOTHING]
@@ -117,11 +130,10 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
 
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802
     try:
-        A = exact_reduction(model).A
-    except (ComplexModelError, UncertainRankError):
+        poles = poles_of_model(model, working_matrix(model)).values
+    except NoStateSpaceError:
         return []
-    poles = scipy.linalg.eigvals(A) if A.size else NONE
-    return [(np.asarray(poles), f"poles of A{closed}", CROSS)]
+    return [(poles, f"poles of A{closed}", CROSS)]
 
 
 def _zeros_of(sys: control.StateSpace) -> ComplexArray:
@@ -140,6 +152,8 @@ def draw_plane(ax: Axes, *, grid: bool, discrete: bool) -> None:
         ax.set_aspect("equal", adjustable="box")
         ax.set_xlabel("real part of z [-]")
         ax.set_ylabel("imaginary part of z [-]")
+        if grid:
+            draw_discrete_grid(ax)
         return
     right = ax.get_xlim()[1]
     ax.axvline(0.0, label="_boundary", **boundary)

@@ -10,23 +10,21 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     AxesArray,
     AxesLike,
-    Units,
     draw_grid,
     finished_plot,
-    known_units,
     label_y,
     no_lines,
-    plain,
     prepared_axes,
-    ratio_unit,
+    usual_largest,
 )
-from halfdof_ctrl.plots.bode import continuous_phase
-from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
+from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
+from halfdof_ctrl.systems.phase import response_phase
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
     dynamic_stiffness_response,
@@ -39,12 +37,15 @@ Models: TypeAlias = SecondOrderModel | Iterable[SecondOrderModel]
 Labels: TypeAlias = str | Sequence[str] | None
 
 SCALES: tuple[Scale, ...] = get_args(Scale)
-ANGLE_STEPS = {True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0), False: (1.0, 2.0, 5.0, 10.0)}  #: of ticks, by WIDE or not
-WIDE = 60.0  #: [deg] range of angles with ticks at parts of a right angle
-USUAL = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
-SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
-ROOM = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
-FLAT = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
+ANGLE_STEPS = {
+    True: (1.0, 1.5, 3.0, 4.5, 6.0, 9.0, 10.0),
+    False: (1.0, 2.0, 5.0, 10.0),
+}  #: of ticks, by WIDE_ANGLES or not
+WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
+USUAL_WIDTH = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
+STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
+ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
+CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
 
 
 def dynamic_stiffness_plot(
@@ -70,8 +71,8 @@ def dynamic_stiffness_plot(
     dof : str or sequence of str
         DOF that is moved, as in `dynamic_stiffness`.
     omega : (k,) array_like, optional
-        Frequencies [rad/s], the very points; also with `Hz`. By default those of `stiffness.motion_frequencies`,
-        the same for all models.
+        Frequencies [rad/s], the very points; also with `Hz`. By default the same for all models, those of
+        `~halfdof_ctrl.systems.stiffness.motion_frequencies`.
     ax : (2,) array_like of Axes, optional
         For the modulus and the loss angle.
     xscale, yscale : {"linear", "log"}
@@ -172,7 +173,8 @@ def transmissibility_plot(
     models, texts = _models(sysdata, label)
     _require_scales(xscale, yscale)
     if omega is None:
-        omega = motion_frequencies(models, from_ if kind == "motion" else to, linear=xscale == "linear")
+        held, other = (from_, to) if kind == "motion" else (to, from_)
+        omega = motion_frequencies(models, held, other=other, linear=xscale == "linear")
     responses = [transmissibility_response(model, from_, to, omega, kind=kind) for model in models]
     causes, results = as_tuple(from_), as_tuple(to)
     unit = _ratio_unit(models[0], units, results, causes)
@@ -192,7 +194,7 @@ def transmissibility_plot(
 
 
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
-    """Give the models as a list, and the text of each in the legend; an underscore keeps it out."""
+    """Return the models as a list, and the text of each in the legend; an underscore keeps it out."""
     given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
     models = list(given) if isinstance(given, Iterable) else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
@@ -222,7 +224,7 @@ def _require_scales(xscale: str, yscale: str) -> None:
 
 
 def _ratio_unit(model: SecondOrderModel, units: Units, over: Sequence[str], under: Sequence[str]) -> str:
-    """Give the unit of a ratio in brackets, if all DOFs that move together have the same."""
+    """Return the unit of a ratio in brackets, if all DOFs that move together have the same."""
     known = known_units(model, units)
     found = {ratio_unit(above, below, known) for above in over for below in under}
     unit = found.pop()
@@ -237,7 +239,7 @@ def _draw(
         omega, values = np.asarray(response.omega, dtype=float), np.asarray(response.frdata)[0, 0]
         x = omega / (2.0 * np.pi) if Hz else omega
         lines[0, 0] += axes[0, 0].plot(x, np.abs(values), label=text, linewidth=1.5)
-        lines[1, 0] += axes[1, 0].plot(x, np.degrees(continuous_phase(values)), label=text, linewidth=1.5)
+        lines[1, 0] += axes[1, 0].plot(x, np.degrees(response_phase(response)[0, 0]), label=text, linewidth=1.5)
     return lines
 
 
@@ -257,7 +259,7 @@ def _dress(axes: AxesArray, xscale: Scale, yscale: Scale, *, Hz: bool, grid: boo
 
 
 def _drawn(ax: Axes) -> FloatArray:
-    """Give the ordinates of all curves that are finite."""
+    """Return the ordinates of all curves that are finite."""
     values = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     return np.asarray(values[np.isfinite(values)])
 
@@ -266,8 +268,8 @@ def _set_angle(ax: Axes) -> None:
     """Put ticks where angles are read, and show a constant angle as such."""
     angles = _drawn(ax)
     span = float(np.ptp(angles)) if angles.size else 0.0
-    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE])))
-    if angles.size and span < FLAT:
+    ax.yaxis.set_major_locator(MaxNLocator(nbins=5, steps=list(ANGLE_STEPS[span > WIDE_ANGLES])))
+    if angles.size and span < CONSTANT_SPAN:
         ax.set_ylim(angles.mean() - 1.0, angles.mean() + 1.0)
 
 
@@ -278,11 +280,11 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = float(np.percentile(curve, USUAL))
-    if curve.max() - curve.min() <= FLAT * curve.max():
+    usual = usual_largest(ax, USUAL_WIDTH)
+    if curve.max() - curve.min() <= CONSTANT_SPAN * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
-    elif curve.max() > SPIKE[scale] * usual:
-        ax.set_ylim(top=ROOM[scale] * usual)
+    elif curve.max() > STIFFNESS_SPIKE[scale] * usual:
+        ax.set_ylim(top=ROOM_ABOVE[scale] * usual)
     if scale == "linear" and ax.get_ylim()[0] < 0.0:
         ax.set_ylim(bottom=0.0)
 

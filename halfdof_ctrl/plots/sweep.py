@@ -9,24 +9,26 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.plots.axes import AxesArray, AxesLike, Units, draw_legend, draw_title, known_units, no_lines, prepared_axes
-from halfdof_ctrl.plots.bode import Scales, continuous_phase, dress_bode
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.plots.branches import followed
-from halfdof_ctrl.model.second_order import mechss
 from halfdof_ctrl.base.names import control_labels
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_legend, draw_title, no_lines, prepared_axes
+from halfdof_ctrl.plots.bode import Scales, dress_bode
+from halfdof_ctrl.plots.branches import followed
 from halfdof_ctrl.plots.pole_grid import set_pole_axes
 from halfdof_ctrl.plots.pole_map import draw_plane
 from halfdof_ctrl.plots.sweep_colours import CaseColours, Numbers, coloured_cases
+from halfdof_ctrl.plots.units import Units, known_units
 from halfdof_ctrl.sweeps.result import SweepResult
+from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 Kind: TypeAlias = Literal["bode", "poles"]
 
 MANY = 12  #: from so many curves on they are drawn thinner
 BRANCH: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "label": "_branch", "zorder": 2.4}
-FIRST: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
-BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
-LAST: dict[str, Any] = {"marker": "s", "markersize": 5.5, "markeredgewidth": 0.0, "zorder": 3.1}
+FIRST_CASE: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
+CASES_BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
+LAST_CASE: dict[str, Any] = {"marker": "s", "markersize": 5.5, "markeredgewidth": 0.0, "zorder": 3.1}
 ARROW: dict[str, Any] = {
     "arrowstyle": "-|>",
     "color": "0.35",
@@ -149,7 +151,7 @@ def _draw_curves(
 
 
 def _signal_units(result: SweepResult, units: Units) -> dict[str, str]:
-    """Give the units of the signals, as a model with the same DOFs has them."""
+    """Return the units of the signals, as a model with the same DOFs has them."""
     given = {name: unit for name, unit in (units or {}).items() if name not in result.parameters}
     own = {name: unit for name, unit in given.items() if name in {*result.inputs, *result.outputs} - {*result.dofs}}
     rest = {name: unit for name, unit in given.items() if name not in own}
@@ -169,12 +171,12 @@ def _draw_poles(result: SweepResult, cases: CaseColours, ax: AxesLike, *, grid: 
         set_pole_axes(plane, shown[~np.isnan(shown)], discrete=result.discrete)
         draw_plane(plane, grid=grid, discrete=result.discrete)
     ways = _ways(result, cases)
-    ends = {number: style for way in ways for number, style in ((way[0], FIRST), (way[-1], LAST))}
+    ends = {number: style for way in ways for number, style in ((way[0], FIRST_CASE), (way[-1], LAST_CASE))}
     for place, number in enumerate(cases.numbers.tolist()):
         label = cases.entry(place) if number in ends else _label(cases, place)
         points = poles[number]
         style = {"color": cases.colours[place], "linestyle": "none", "label": label}
-        lines[0, 0] += plane.plot(points.real, points.imag, **style, **ends.get(number, BETWEEN))
+        lines[0, 0] += plane.plot(points.real, points.imag, **style, **ends.get(number, CASES_BETWEEN))
     for way in ways:
         for branch in followed(poles[way]).T:
             lines[0, 0] += plane.plot(branch.real, branch.imag, **BRANCH)

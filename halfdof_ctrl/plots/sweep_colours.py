@@ -11,20 +11,22 @@ import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
-from halfdof_ctrl.plots.axes import AxesArray, Units, plain, typeset
-from halfdof_ctrl.sweeps.cases import Values, in_short
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.plots.axes import AxesArray
+from halfdof_ctrl.plots.units import Units, plain, typeset
+from halfdof_ctrl.sweeps.cases import Values, in_full, in_short
 from halfdof_ctrl.sweeps.result import SweepResult
 
 Colour: TypeAlias = tuple[float, float, float, float]
 Numbers: TypeAlias = npt.NDArray[np.intp]
 
 LIGHTEST = 0.9  #: part of viridis that is seen on white
-MOST_ENTRIES = 6  #: values that a legend names; more of them get a colour bar
-DECADES = 30.0  #: ratio of the largest value to the smallest from which colours follow the logarithm
-SAME = 1e-9  #: relative difference of values that count as one
-PLAIN: Colour = (0.12, 0.47, 0.71, 1.0)  #: where nothing was varied
+MOST_NAMED_VALUES = 6  #: values that a legend names; more of them get a colour bar
+WIDE_VALUES = 30.0  #: ratio of the largest value to the smallest from which colours follow the logarithm
+FEWEST_DIGITS, MOST_DIGITS = 4, 10  #: of a number in a legend
+SAME_VALUE = 1e-9  #: relative difference of values that count as one
+ONE_COLOUR: Colour = (0.12, 0.47, 0.71, 1.0)  #: where nothing was varied
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,7 +42,7 @@ class CaseColours:
     def entry(self, place: int) -> str:
         """Write a value as it stands in a legend."""
         value = self.values[place]
-        return plain(f"{self.name} = {in_short(value.item() if isinstance(value, np.generic) else value)}")
+        return plain(f"{self.name} = {_brief(value.item() if isinstance(value, np.generic) else value, self.values)}")
 
     def draw_bar(self, axes: AxesArray, units: Units) -> None:
         """Put a colour bar beside the axes, if the colours need one."""
@@ -48,6 +50,18 @@ class CaseColours:
             unit = (units or {}).get(self.name)
             label = plain(self.name) + (f" [{typeset(unit)}]" if unit else "")
             axes[0, 0].figure.colorbar(self.scale, ax=list(axes.flat), label=label, aspect=30.0, pad=0.02)
+
+
+def _brief(value: object, among: Values) -> str:
+    """Write a value with as few digits as tell it from the others, and all of them where they are few."""
+    text = in_short(value)
+    if not isinstance(value, float) or float(text) == value:
+        return text
+    others = {other for other in _distinct(among) if isinstance(other, float)}
+    for digits in range(FEWEST_DIGITS, MOST_DIGITS):
+        if len({f"{other:.{digits}g}" for other in others}) == len(others):
+            return text if digits == FEWEST_DIGITS else f"{value:.{digits}g}"
+    return in_full(value)
 
 
 def coloured_cases(result: SweepResult, parameter: str | None, at: Mapping[str, object] | None) -> CaseColours:
@@ -73,22 +87,22 @@ def coloured_cases(result: SweepResult, parameter: str | None, at: Mapping[str, 
     elif several:
         parameter = several[0]
     if parameter is None:
-        return CaseColours(numbers, "", np.zeros(numbers.size), (PLAIN,) * numbers.size, None)
+        return CaseColours(numbers, "", np.zeros(numbers.size), (ONE_COLOUR,) * numbers.size, None)
     values = result.parameters[parameter].reshape(-1)[numbers]
     colours, scale = _coloured(values)
     return CaseColours(numbers, parameter, values, colours, scale)
 
 
 def _kept(result: SweepResult, at: Mapping[str, object]) -> Numbers:
-    """Give the numbers of the cases that were done and have the wanted values."""
+    """Return the numbers of the cases that were done and have the wanted values."""
     keep = np.ones(result.shape, dtype=bool)
     for name, value in at.items():
         _require_parameter(result, name)
         values = result.parameters[name]
         same = np.array([_are_same(one, value) for one in values.reshape(-1).tolist()]).reshape(result.shape)
         if not same.any():
-            known = listed([in_short(known) for known in _distinct(values.reshape(-1))], most=12)
-            msg = f"at: no case has {name} = {in_short(value)}. There are {known}."
+            known = listed([in_full(known) for known in _distinct(values.reshape(-1))], most=12)
+            msg = f"at: no case has {name} = {in_full(value)}. There are {known}."
             raise ParameterError(msg, parameter=name, value=value)
         keep &= same
     for failure in result.failures:
@@ -111,9 +125,9 @@ def _coloured(values: Values) -> tuple[tuple[Colour, ...], ScalarMappable | None
     """Colour the values: by their place among a few, by their size among many."""
     distinct = _distinct(values)
     colourmap = _colourmap()
-    if len(distinct) > MOST_ENTRIES and values.dtype.kind in "iuf":
+    if len(distinct) > MOST_NAMED_VALUES and values.dtype.kind in "iuf":
         low, high = float(values.min()), float(values.max())
-        norm = LogNorm(low, high) if low > 0.0 and high > DECADES * low else Normalize(low, high)
+        norm = LogNorm(low, high) if low > 0.0 and high > WIDE_VALUES * low else Normalize(low, high)
         scale = ScalarMappable(norm, colourmap)
         return tuple([tuple(colour) for colour in scale.to_rgba(values.astype(float)).tolist()]), scale
     places = [distinct.index(value) for value in values.tolist()]
@@ -132,11 +146,11 @@ def _distinct(values: Values) -> list[Any]:
 def _are_same(first: object, second: object) -> bool:
     """Compare two values, numbers up to rounding."""
     if isinstance(first, int | float) and isinstance(second, int | float | np.integer | np.floating):
-        return math.isclose(first, second, rel_tol=SAME)
+        return math.isclose(first, second, rel_tol=SAME_VALUE)
     return bool(first == second)
 
 
 def _colourmap() -> LinearSegmentedColormap:
-    """Give viridis without its lightest part."""
+    """Return viridis without its lightest part."""
     whole = mpl.colormaps["viridis"]
     return LinearSegmentedColormap.from_list("viridis on white", whole(np.linspace(0.0, LIGHTEST, 256)))

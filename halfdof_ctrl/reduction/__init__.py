@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""From a model to its exact states, and to few modes."""

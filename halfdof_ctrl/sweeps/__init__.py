@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Many cases, on the cores of a machine or on a cluster."""

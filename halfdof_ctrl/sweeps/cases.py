@@ -25,6 +25,9 @@ Parameters: TypeAlias = Mapping[str, object] | Sequence[Mapping[str, object]] | 
 
 CASE = "case"  #: name of the axis of a list or sample
 
+SHORT = 7  #: characters of a number that is written as it is
+FOUR_DIGITS, TEN_DIGITS = 1e4, 1e10  #: sizes between which four digits would need a power of ten
+
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class Cases:
@@ -44,12 +47,12 @@ class Cases:
         return math.prod(self.shape)
 
     def varied(self, number: int) -> dict[str, object]:
-        """Give the parameters of a case that are not the same for all."""
+        """Return the parameters of a case that are not the same for all."""
         place = np.unravel_index(number, self.shape)
         return {name: _plain(values[place]) for name, values in self.parameters.items()}
 
     def arguments(self, number: int) -> dict[str, object]:
-        """Give all parameters of a case."""
+        """Return all parameters of a case."""
         return self.fixed | self.varied(number)
 
 
@@ -108,7 +111,7 @@ def require_accepted(function: Callable[..., object], cases: Cases) -> None:
 
 
 def name_of(function: object) -> str:
-    """Give the name of a function as messages write it."""
+    """Return the name of a function as messages write it."""
     return str(getattr(function, "__qualname__", None) or type(function).__name__)
 
 
@@ -122,8 +125,20 @@ def in_words(parameters: Mapping[str, object]) -> str:
 
 
 def in_short(value: object) -> str:
-    """Write a value, a number with four digits."""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+    """Write a value, a number in full where that is short or before the point, else with four digits.
+
+    >>> in_short(150001.0), in_short(0.125), in_short(1 / 3)
+    ('150001', '0.125', '0.3333')
+    """
+    if not isinstance(value, float):
+        return str(value)
+    text = in_full(value)
+    return text if len(text) <= SHORT or FOUR_DIGITS <= abs(value) < TEN_DIGITS else f"{value:.4g}"
+
+
+def in_full(value: object) -> str:
+    """Write a value with the digits that tell it from others."""
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def _grid(varied: dict[str, Values], fixed: dict[str, object]) -> Cases:
@@ -196,7 +211,7 @@ def _as_values(name: str, given: object) -> Values:
 
 
 def _plain(value: object) -> object:
-    """Give a Python number for a NumPy one."""
+    """Return a Python number for a NumPy one."""
     return value.item() if isinstance(value, np.generic) else value
 
 

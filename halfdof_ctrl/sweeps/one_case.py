@@ -15,18 +15,19 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.sweeps.cases import name_of
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
-from halfdof_ctrl.base.errors import ComplexModelError, ParameterError, SingularLeadingMatrixError
-from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.base.names import Names, force_names, motion_names, name_from_label, unknown_name_error
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.sweeps.cases import name_of
 from halfdof_ctrl.systems.frequency import frequency_response
 
 System: TypeAlias = SecondOrderModel | control.StateSpace
 Quantity: TypeAlias = Literal["poles", "response"] | Callable[[Any], object]
 
-NUMBERS = "biufc"  #: kinds of arrays that count as results
+RESULT_KINDS = "biufc"  #: kinds of arrays that count as results
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -155,7 +156,7 @@ class Constant:
     system: SecondOrderModel
 
     def __call__(self) -> SecondOrderModel:
-        """Give the system."""
+        """Return the system."""
         return self.system
 
 
@@ -187,7 +188,7 @@ def selected(system: System, inputs: Names, outputs: Names) -> System:
 
 
 def signals_of(system: System) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Give the names of the inputs and of the outputs."""
+    """Return the names of the inputs and of the outputs."""
     if isinstance(system, SecondOrderModel):
         return system.inputs, system.outputs
     return tuple(map(name_from_label, system.input_labels)), tuple(map(name_from_label, system.output_labels))
@@ -207,7 +208,7 @@ def poles_of(system: System) -> ComplexArray:
         return by_size(_eigenvalues(np.asarray(system.A)))
     try:
         return by_size(_eigenvalues(exact_reduction(system).A))
-    except (ComplexModelError, SingularLeadingMatrixError):
+    except NoStateSpaceError:
         require_regular(system)
         return by_size(pencil_structure(system).finite_eigenvalues)
 
@@ -241,14 +242,14 @@ def as_numbers(value: object) -> npt.NDArray[Any]:
         array = np.asarray(value)
     except ValueError:  # rows of different length
         array = np.empty(0, dtype=object)
-    if array.dtype.kind not in NUMBERS:
+    if array.dtype.kind not in RESULT_KINDS:
         msg = f"The function gave {type(value).__name__}, but a sweep keeps numbers and arrays of numbers alone."
         raise ParameterError(msg, parameter="function", value=type(value).__name__)
     return array
 
 
 def _seen_dofs(model: SecondOrderModel) -> tuple[str, ...]:
-    """Give the DOFs whose force or motion is an input or output, from which the units of plots follow."""
+    """Return the DOFs whose force or motion is an input or output, from which the units of plots follow."""
     seen = {*model.inputs, *model.outputs}
     names = zip(model.dofs, force_names(model.dofs), *(motion_names(model.dofs, k) for k in range(3)), strict=True)
     return tuple([dof for dof, *motions in names if not seen.isdisjoint(motions)])

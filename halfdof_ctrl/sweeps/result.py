@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.sweeps.cases import Cases, Values, in_words
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.sweeps.cases import Cases, Values, in_words
 from halfdof_ctrl.sweeps.one_case import CaseError, CaseResult
 
 Outcome: TypeAlias = CaseResult | CaseError
@@ -62,7 +62,7 @@ class SweepResult:
         return tuple([len(values) for values in self.axes.values()])
 
     def __repr__(self) -> str:
-        """Give the sweep on a few lines: its axes, what it has, what failed."""
+        """Return the sweep on a few lines: its axes, what it has, what failed."""
         count = math.prod(self.shape)
         axes = " x ".join(f"{name} ({len(values)})" for name, values in self.axes.items())
         lines = [f"{type(self).__name__}: {count} case{'s' * (count != 1)}" + (f", {axes}" if axes else "")]
@@ -120,7 +120,7 @@ def joined_frequencies(outcomes: Sequence[Outcome], omega: FloatArray) -> SweepR
 
 
 def _first(outcomes: Sequence[Outcome]) -> CaseResult:
-    """Give the first result, or an empty one where every case failed."""
+    """Return the first result, or an empty one where every case failed."""
     return next((outcome for outcome in outcomes if isinstance(outcome, CaseResult)), CaseResult())
 
 

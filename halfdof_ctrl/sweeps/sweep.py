@@ -13,16 +13,17 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.sweeps.cases import Parameters, listed_cases, require_accepted
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, callers_level
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.names import Names
-from halfdof_ctrl.sweeps.one_case import CaseError, CaseWork, Constant, FrequencyWork, Quantity
 from halfdof_ctrl.base.progress import progress_bar
-from halfdof_ctrl.systems.frequency import checked_frequencies
-from halfdof_ctrl.sweeps.result import Outcome, SweepResult, joined_cases, joined_frequencies
 from halfdof_ctrl.base.threads import available_cores
-from halfdof_ctrl.sweeps.workers import Work, work_through
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.sweeps.cases import Parameters, listed_cases, require_accepted
+from halfdof_ctrl.sweeps.one_case import CaseError, CaseWork, Constant, FrequencyWork, Quantity
+from halfdof_ctrl.sweeps.process_pool import Work
+from halfdof_ctrl.sweeps.result import Outcome, SweepResult, joined_cases, joined_frequencies
+from halfdof_ctrl.sweeps.workers import work_through
+from halfdof_ctrl.systems.frequency import checked_frequencies
 
 QUANTITIES = ("poles", "response")
 EVERY_CORE = -1  #: as many workers as cores

@@ -8,9 +8,6 @@ Linear algebra in a worker is held to its share of the cores (see `threads`).
 """
 
 import math
-import pickle
-import signal
-import sys
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -21,11 +18,10 @@ from typing import Any, TypeAlias
 from halfdof_ctrl.base.errors import WorkerError
 from halfdof_ctrl.base.progress import silence
 from halfdof_ctrl.base.threads import available_cores, limited_threads
+from halfdof_ctrl.sweeps.process_pool import ProcessPool, Work
 
-Work: TypeAlias = Callable[[list[Any]], list[Any]]  #: gives one result for each item and raises nothing
 Store: TypeAlias = Callable[[int, Any], None]  #: takes the number of an item and its result or the error that it met
 Chunk: TypeAlias = list[int]  #: numbers of items
-
 CHUNK_SECONDS = 0.25  #: of work in a chunk
 SHARES = 2  #: chunks that a worker still gets at least, so that none has all that is left
 EVEN_SHARES = 4  #: chunks for each worker where all are cut at the beginning
@@ -100,7 +96,7 @@ class _Waiting:
         return bool(self._left or self._single)
 
     def take(self) -> Chunk:
-        """Give the next chunk: a single item as long as nobody knows how long one takes."""
+        """Return the next chunk: a single item as long as nobody knows how long one takes."""
         if not self._left:
             return [self._single.popleft()]
         size = self._size
@@ -115,7 +111,7 @@ class _Waiting:
         self._done += len(chunk)
 
     def put_back(self, chunk: Chunk) -> None:
-        """Give back what could not be handed over."""
+        """Return back what could not be handed over."""
         self._left.extendleft(reversed(chunk))
 
     def split(self, chunk: Chunk) -> None:
@@ -230,7 +226,7 @@ def _work_in_processes(work: Work, items: Sequence[Any], store: Store, workers: 
     workers = min(workers, len(items))
     current = _Round(work, items, store, threads=max(1, available_cores() // workers))
     waiting = _Waiting(len(items), workers, even=even)
-    pool = _Pool(work, workers)
+    pool = ProcessPool(work, workers)
     try:
         while waiting:
             suspects = deque(current.run(pool.executor, waiting, most=workers))
@@ -248,7 +244,7 @@ def _work_in_processes(work: Work, items: Sequence[Any], store: Store, workers: 
         pool.stop()
 
 
-def _alone(pool: "_Pool", current: _Round, waiting: _Waiting, chunk: Chunk) -> list[Chunk]:
+def _alone(pool: "ProcessPool", current: _Round, waiting: _Waiting, chunk: Chunk) -> list[Chunk]:
     """Do a chunk with nothing beside it; if its worker dies, give its halves, or fail the single item."""
     for _ in range(ATTEMPTS if len(chunk) == 1 else 1):
         with suppress(BrokenExecutor):  # a process that died with nothing to do counts like one that died at work
@@ -265,73 +261,6 @@ def _alone(pool: "_Pool", current: _Round, waiting: _Waiting, chunk: Chunk) -> l
         return []
     middle = len(chunk) // 2
     return [chunk[middle:], chunk[:middle]]  # as extendleft takes them
-
-
-class _Pool:
-    """A process pool that can be started anew."""
-
-    def __init__(self, work: Work, workers: int) -> None:
-        self._work, self._workers = work, workers
-        try:
-            pickle.dumps(work)
-        except Exception as cause:  # whatever an object raises that will not be pickled
-            msg = (
-                f"{work} cannot be sent to another process: {cause}. Write the function at the top level of a module "
-                "(no lambda, no function within a function), or use an executor of threads or of Dask."
-            )
-            raise WorkerError(msg, function=str(work)) from cause
-        self.executor = self._started()
-
-    def _started(self) -> Executor:
-        """Start all processes and wait until each has loaded the work."""
-        import multiprocessing  # noqa: PLC0415  # costs time, which a bare import of the package does not need
-        from concurrent.futures import ProcessPoolExecutor  # noqa: PLC0415
-
-        if sys.platform == "linux":  # forks from a process that has loaded the package, and nothing else
-            context = multiprocessing.get_context("forkserver")
-            context.set_forkserver_preload(["halfdof_ctrl"])
-        else:
-            context = multiprocessing.get_context("spawn")
-        executor = ProcessPoolExecutor(self._workers, mp_context=context, initializer=_prepare_process)
-        try:
-            for ready in [executor.submit(_load, self._work) for _ in range(self._workers)]:
-                ready.result()
-        except (BrokenExecutor, RuntimeError) as cause:
-            _stop(executor)
-            msg = (
-                f"The worker processes cannot start, or cannot load {self._work}; their own words are on stderr. "
-                "A script that starts processes needs `if __name__ == '__main__':` before what it does, and a function "
-                "that was typed into a notebook or an interpreter must be moved into a module that both can import."
-            )
-            raise WorkerError(msg, function=str(self._work)) from cause
-        except BaseException:
-            _stop(executor)
-            raise
-        return executor
-
-    def restart(self) -> None:
-        """Replace a broken pool."""
-        self.stop()
-        self.executor = self._started()
-
-    def stop(self) -> None:
-        """End all processes at once."""
-        _stop(self.executor)
-
-
-def _stop(executor: Executor) -> None:
-    for process in list((getattr(executor, "_processes", None) or {}).values()):  # Python 3.14 has a public way
-        process.terminate()
-    executor.shutdown(cancel_futures=True)
-
-
-def _prepare_process() -> None:
-    """Let Ctrl-C end a worker without a word: the main process tells what became of the work."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
-def _load(work: Work) -> None:
-    """Show that the work has arrived."""
 
 
 def _error_of(future: Future[Any]) -> BaseException | None:

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""The StateSpace and what is computed with it; python-control enters here."""

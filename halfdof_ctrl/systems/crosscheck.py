@@ -16,32 +16,28 @@ from typing import Any
 
 import control
 import numpy as np
-import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, powers_of_two, read_only
-from halfdof_ctrl.model.dense_copy import dense_copy
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular, typical_frequency
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two, read_only
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
+from halfdof_ctrl.base.spectrum import ROUNDING_OF_A
+from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.base.words import complex_in_words
+from halfdof_ctrl.descriptor.first_order import typical_frequency
+from halfdof_ctrl.descriptor.radau import descriptor_step_response, step_plan
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.dense_copy import complex_model_error, dense_copy
 from halfdof_ctrl.model.evaluation import quadratic_rounding
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE, compare_poles, in_words
-from halfdof_ctrl.descriptor.radau import descriptor_step_response, step_plan
-from halfdof_ctrl.reduction.choose import complex_model_error
+from halfdof_ctrl.systems.balanced_system import BalancedSystem
+from halfdof_ctrl.systems.check_points import check_points, moving_eigenvalues
+from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE, compare_poles
 from halfdof_ctrl.systems.second_opinion import second_opinion
-from halfdof_ctrl.base.spectrum import ROUNDING, balanced_states, eigenvalues_and_rounding
-from halfdof_ctrl.base.threads import limited_threads
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the channel's largest value, beside what rounding in A may change
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
-SMALL = 1e-6  #: of the largest or of the typical frequency: eigenvalues below may stand for one at the origin
-EPS = float(np.finfo(float).eps)
 SAFETY = 10.0  #: times what one random rounding of the descriptor form changes in a step response
-ROUNDING_OF_ZERO = 1024 * np.finfo(float).eps  #: of the size of output and input, left of a channel that is zero
-AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
-CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
-GRID_POINTS = 60  #: points on the axis besides those at the poles
-MOST_POLE_POINTS = 100  #: poles that get a point of their own
-OFF_AXIS = (1.0 + 0.0j, 1.0 + 1.0j)  #: directions of the points off the axis, in units of a pole's size
+ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -74,7 +70,7 @@ class CrossCheck:
         )
 
     def as_dict(self) -> dict[str, bool | int | float | str]:
-        """Give the verdict and all figures, as for a JSON file."""
+        """Return the verdict and all figures, as for a JSON file."""
         return {"passed": self.passed, **asdict(self)}
 
     def __repr__(self) -> str:
@@ -164,10 +160,10 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
 def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     """Compare all that can be."""
     structure = pencil_structure(model)
-    system = _Balanced.of(sys)
+    system = BalancedSystem.of(sys)
     finite = structure.finite_eigenvalues
     gamma = typical_frequency(model)
-    moving = _moving(finite, system.A, gamma)
+    moving = moving_eigenvalues(finite, system.A, gamma)
     transfer = _compare_transfer(model, system, sys, moving)
     pole_error, pole_worst = compare_poles(model, system.A, finite, gamma)
     step_error, step_worst, horizon = _compare_steps(model, system, moving, transfer.unclear, structure.index)
@@ -189,40 +185,6 @@ def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Balanced:
-    """A state space with its states scaled by powers of two."""
-
-    A: FloatArray
-    B: FloatArray
-    C: FloatArray
-    D: FloatArray
-
-    @classmethod
-    def of(cls, sys: control.StateSpace) -> "_Balanced":
-        A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
-        if A.size == 0:
-            return cls(A, B, C, D)
-        balanced, scale = balanced_states(A)
-        return cls(balanced, B / scale[:, None], C * scale, D)
-
-    def __call__(self, points: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-        """Evaluate by a solve a point, (p, m, k), with the change that rounding in A makes, |y| |A| |x|."""
-        size, unit = np.abs(self.A), np.eye(self.A.shape[0])
-        values, changes = [], []
-        for s in points:
-            shifted = s * unit - self.A
-            try:
-                x, y = np.linalg.solve(shifted, self.B), np.linalg.solve(shifted.T, self.C.T)
-            except np.linalg.LinAlgError:  # a pole where the model has none
-                values.append(np.full(self.D.shape, np.inf))
-                changes.append(np.zeros(self.D.shape))
-                continue
-            values.append(self.C @ x + self.D)
-            changes.append(ROUNDING * (np.abs(y).T @ size + np.abs(self.C)) @ np.abs(x))
-        return np.stack(values, axis=2), np.stack(changes, axis=2)
-
-
 @dataclass(frozen=True, slots=True)
 class _TransferErrors:
     error: float
@@ -233,18 +195,18 @@ class _TransferErrors:
 
 
 def _compare_transfer(
-    model: SecondOrderModel, system: _Balanced, sys: control.StateSpace, moving: ComplexArray
+    model: SecondOrderModel, system: BalancedSystem, sys: control.StateSpace, moving: ComplexArray
 ) -> _TransferErrors:
-    points = _points(moving)
+    points = check_points(moving)
     exact = model(points, squeeze=False)
     found, rounding = system(points)
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
     quadratics = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
-    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING / EPS)
+    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING_OF_A / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
-    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {in_words(points[k])}"
+    worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {complex_in_words(points[k])}"
     with np.errstate(divide="ignore", invalid="ignore"):
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
     evaluated = np.asarray(sys(points, squeeze=False, warn_infinite=False))
@@ -255,44 +217,10 @@ def _compare_transfer(
     return _TransferErrors(float(errors[i, j, k]), worst, float(pointwise.max()), evaluation, unclear)
 
 
-def _moving(finite: ComplexArray, A: FloatArray, gamma: float) -> ComplexArray:
-    """Leave out eigenvalues at the origin, which QZ finds at the square root of rounding where they are double.
-
-    One counts as at the origin if it is small and its nearest pole of the state space is zero to what A tells.
-    Where none is left, the model's typical frequency stands for the time scale.
-    """
-    poles, rounding = eigenvalues_and_rounding(A)
-    away = finite[np.abs(finite) > AT_ORIGIN * gamma]
-    if poles.size and away.size:
-        nearest = np.abs(away[:, None] - poles).argmin(axis=1)
-        away = away[~(_is_small(away, gamma) & (np.abs(poles) <= rounding)[nearest])]
-    return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
-
-
-def _is_small(eigenvalues: ComplexArray, gamma: float) -> npt.NDArray[np.bool_]:
-    """Tell which eigenvalues are so small that they may stand for one at the origin."""
-    return np.asarray(np.abs(eigenvalues) <= SMALL * max(np.abs(eigenvalues).max(initial=0.0), gamma))
-
-
-def _points(moving: ComplexArray) -> ComplexArray:
-    """Choose points on the imaginary axis around and at the poles, and off the axis."""
-    chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
-    low, high = np.abs(moving).min(), np.abs(moving).max()
-    grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
-    swinging = chosen[chosen.imag > 0.0]
-    lift = np.maximum(0.0, CLEARANCE * np.abs(swinging) - np.abs(swinging.real))
-    at_poles = lift + 1j * swinging.imag
-    at_sizes = 1j * np.abs(chosen)
-    off_axis = np.concatenate([direction * np.array([low, np.sqrt(low * high), high]) for direction in OFF_AXIS])
-    points = np.concatenate([1j * grid, at_poles, at_sizes, off_axis])
-    near = np.abs(points[:, None] - moving).min(axis=1) < CLEARANCE * np.abs(points)
-    return np.where(near, points + CLEARANCE * np.abs(points), points)
-
-
 def _compare_steps(
-    model: SecondOrderModel, system: _Balanced, moving: ComplexArray, unclear: FloatArray, index: int
+    model: SecondOrderModel, system: BalancedSystem, moving: ComplexArray, unclear: FloatArray, index: int
 ) -> tuple[float, str, float]:
-    """Follow the response to a step of each input by both roads, segment by segment."""
+    """Follow the response to a step of each input by both routes, segment by segment."""
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         return 0.0, "not followed: a step has no derivative for Bv, Ba, Dv, Da", 0.0
     plan = step_plan(moving)
@@ -329,20 +257,20 @@ def _rounded(model: SecondOrderModel) -> SecondOrderModel:
     generator = np.random.default_rng(0)
     letters = ("M", "C", "K", "B", "F", "G", "H", "D")
     entries = {letter: getattr(model, letter) for letter in letters}
-    shares = {letter: ROUNDING * generator.uniform(-1.0, 1.0, entry.shape) for letter, entry in entries.items()}
+    shares = {letter: ROUNDING_OF_A * generator.uniform(-1.0, 1.0, entry.shape) for letter, entry in entries.items()}
     rounded: dict[str, Any] = {k: read_only(entry * (1.0 + shares[k])) for k, entry in entries.items()}
     return replace(model, **rounded)
 
 
 def _channel_size(size: FloatArray) -> FloatArray:
-    """Give the largest value of each channel (p, m, 1); of the whole response where a channel is zero."""
+    """Return the largest value of each channel (p, m, 1); of the whole response where a channel is zero."""
     largest = size.max(axis=2, keepdims=True)
     overall = size.max(initial=0.0)
     return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
 
 
 def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
-    """Give what rounding leaves of a channel that is zero, by the sizes of its output and its input (p, m, 1)."""
+    """Return what rounding leaves of a channel that is zero, by the sizes of its output and its input (p, m, 1)."""
     by_output = largest.max(axis=1, keepdims=True)
     with np.errstate(invalid="ignore"):
         by_input = (largest / by_output).max(axis=0, keepdims=True)

@@ -8,13 +8,13 @@ import numpy as np
 import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.words import eigenvalue_in_words
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 SAME_PAIR = 1e-8  #: relative distance to the conjugate at which two eigenvalues are one pair
-FIXED = (1e-2, 1e6)  #: sizes that four decimals show well
 NO_INERTIA = "infinite"
-HEAD = ("descriptor form", "state space", "difference")
+TABLE_TITLES = ("descriptor form", "state space", "difference")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -34,7 +34,7 @@ class EigenvalueTable:
 
     def __repr__(self) -> str:
         """Print as a table."""
-        rows = [HEAD, *self.rows]
+        rows = [TABLE_TITLES, *self.rows]
         widths = [max(len(row[column]) for row in rows) + 3 for column in range(2)]
         lines = [
             f"{before:<{widths[0]}}{after:<{widths[1]}}{difference}".rstrip() for before, after, difference in rows
@@ -74,20 +74,6 @@ def eigenvalue_table(model: SecondOrderModel, sys: control.StateSpace) -> Eigenv
     )
 
 
-def eigenvalue_in_words(value: complex, *, pair: bool = False) -> str:
-    """Write an eigenvalue with four decimals, a conjugate pair as one.
-
-    >>> eigenvalue_in_words(-0.5 + 2j, pair=True)
-    '-0.5000 ± 2.0000i'
-    """
-    kind = "f" if FIXED[0] <= abs(value) < FIXED[1] or value == 0 else "e"
-    real = _without_minus_zero(f"{value.real:.4{kind}}")
-    if value.imag == 0.0:
-        return real
-    sign = "±" if pair else "+-"[value.imag < 0.0]
-    return f"{real} {sign} {abs(value.imag):.4{kind}}i"
-
-
 def eigenvalues_in_words(values: Iterable[complex]) -> list[str]:
     """Write eigenvalues, largest first, conjugate pairs as one."""
     found = np.array(sorted(values, key=abs, reverse=True), dtype=np.complex128)
@@ -111,7 +97,3 @@ def _paired_rows(before: ComplexArray, after: ComplexArray) -> list[tuple[str, s
         texts = [eigenvalue_in_words(complex(number), pair=pair) for number in (value, after[k])]
         rows.append((texts[0], texts[1], f"{difference:.1e}"))
     return rows
-
-
-def _without_minus_zero(text: str) -> str:
-    return text[1:] if text.startswith("-") and float(text) == 0.0 else text

@@ -11,35 +11,40 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
 from halfdof_ctrl.base.errors import (
-    ComplexModelError,
-    ImproperError,
+    NoStateSpaceError,
     ParameterError,
-    SingularLeadingMatrixError,
-    UncertainRankError,
 )
-from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.model.second_order import SecondOrderModel, null_column_kinds
-from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.base.names import control_label, control_labels
-from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.base.sparse_arrays import as_sparse
-from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
-from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
-from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
-from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
+from halfdof_ctrl.model.kinds import null_column_kinds
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
+from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
+from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visible_zeros
+from halfdof_ctrl.systems.hessenberg import state_space_response
+from halfdof_ctrl.systems.origin import poles_of_model
+from halfdof_ctrl.systems.pencil_poles import pencil_poles
+from halfdof_ctrl.systems.phase import source_of, with_source
+from halfdof_ctrl.systems.pole_bounds import bounded_poles
+from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
+from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.working_states import response_of_form, working_form
 
-NO_STATE_SPACE = (ComplexModelError, ImproperError, SingularLeadingMatrixError, UncertainRankError)
-DEFAULT_POINTS = 1000  #: frequencies of a default grid, before those at resonances
+DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
-MARGIN = 10.0  #: a default grid reaches this factor below and above the modes
-AT_ORIGIN = 1e-7  #: of the largest: smaller poles have no part in a default grid
-FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system without any mode away from the origin
+POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
+ZERO_EFFORT = 1e7  #: channels times cubed size up to which the grid is refined at zeros
+MOST_CIRCLED = 400  #: states up to which poles count by their residues
+DISCRETE_ORIGIN = 1e-12  #: |log z| of a pole at 1 that rounding has moved
 
 
 def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = None) -> control.FrequencyResponseData:
@@ -92,7 +97,8 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
         values = dense_frequency_response(model, frequencies)
     name = None if model.name is None else control_label(model.name)
-    return _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
+    data = _data(values, frequencies, control_labels(model.inputs), control_labels(model.outputs), name)
+    return with_source(data, source_of(model))
 
 
 def frequency_response(
@@ -121,7 +127,8 @@ def frequency_response(
     Notes
     -----
     The states are balanced by powers of two and all points are worked side by side on a Hessenberg
-    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`.
+    form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`. A model is worked in
+    energy coordinates where it has them, whatever states `mech2ss` gives.
 
     Examples
     --------
@@ -129,26 +136,31 @@ def frequency_response(
     >>> frequency_response(lag, [0.0]).complex.tolist()
     [(0.5+0j)]
     """
+    model = sysdata if isinstance(sysdata, SecondOrderModel) else None
     if isinstance(sysdata, SecondOrderModel):
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega)
         try:
             sys = mech2ss(sysdata)
-        except NO_STATE_SPACE:
+        except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
+        form = working_form(sysdata, sys.nstates)
     else:
-        sys = sysdata
-    frequencies = checked_frequencies(_system_frequencies(sys) if omega is None else omega)
+        sys, form = sysdata, None
+    if omega is None:
+        omega = system_frequencies(sys if form is None else energy_state_space(form), model)
+    frequencies = checked_frequencies(omega)
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    values = state_space_response(A, B, C, D, points)
-    return _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
+    values = state_space_response(A, B, C, D, points) if form is None else response_of_form(form, (A, B, C, D), points)
+    data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
+    return with_source(data, source_of(sys if model is None else model) or source_of(sys))
 
 
 def has_many_states(model: SecondOrderModel) -> bool:
-    """Tell whether a sparse model has so many states that its descriptor form is evaluated sooner than A, B, C, D."""
+    """Return whether a sparse model has so many states that its descriptor form is evaluated sooner than A, B, C, D."""
     if not model.is_sparse:
         return False
     inertial, half = null_column_kinds(model.M, model.C)
@@ -158,8 +170,8 @@ def has_many_states(model: SecondOrderModel) -> bool:
 def model_frequencies(model: SecondOrderModel) -> FloatArray:
     """Choose frequencies [rad/s] for a model.
 
-    Those of `default_frequencies` for its finite eigenvalues; for a sparse model with many states 200 frequencies, from
-    a tenth of its lowest mode to its twelfth.
+    Those of `default_frequencies` for the finite eigenvalues that its channels show; for a sparse model with many
+    states 200 frequencies, from a tenth of its lowest mode to its twelfth.
 
     Raises
     ------
@@ -167,19 +179,64 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         A sparse model with many states that has no real modes: complex, unsymmetric, or M or K not semidefinite.
     """
     if not model.is_sparse:
-        return default_frequencies(pencil_structure(model).finite_eigenvalues)
+        return _grid(*descriptor_modes(model))
     if not has_many_states(model):
         try:
-            poles, rounding = eigenvalues_and_rounding(exact_reduction(model.select(model.inputs[0])).A)
-            return default_frequencies(poles[np.abs(poles) > rounding])
-        except NO_STATE_SPACE:
+            reduction = exact_reduction(model)
+            return _grid(*system_modes(mech2ss(reduction, improper="drop"), reduction.polynomial_part, model))
+        except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)
     return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
 
 
+def descriptor_modes(model: SecondOrderModel) -> tuple[SeenModes, ComplexArray]:
+    """Find which poles of a dense model its descriptor form shows, and the zeros of its channels."""
+    modes = seen_poles(
+        pencil_poles(model),
+        lambda points: model(points, squeeze=False),
+        np.abs(np.asarray(model.D)),
+        real=not model.is_complex,
+    )
+    p, m = model.D.shape
+    zeros = [np.zeros(0, dtype=np.complex128)]
+    if p * m * len(model.dofs) ** 3 <= ZERO_EFFORT:
+        zeros += [descriptor_zeros(model, i, j) for i in range(p) for j in range(m)]
+    return modes, np.concatenate(zeros)
+
+
+def system_modes(
+    sys: control.StateSpace, polynomial: tuple[FloatArray, ...] = (), model: SecondOrderModel | None = None
+) -> tuple[SeenModes, ComplexArray]:
+    """Find which poles of a continuous state space and a polynomial part are seen, and the zeros of its channels."""
+    A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
+    poles = bounded_poles(A) if model is None else poles_of_model(model, A)
+    if len(A) > MOST_CIRCLED:
+        every = np.ones(poles.values.size, dtype=bool)
+        return SeenModes(poles.values, poles.bounds, every, every), np.zeros(0, dtype=np.complex128)
+    p, m = D.shape
+    zeros = [np.zeros(0, dtype=np.complex128)]
+    if p * m * len(A) ** 3 <= ZERO_EFFORT:
+        zeros += [system_zeros(A, B[:, [j]], C[[i]], D[i, j]) for i in range(p) for j in range(m)]
+
+    def response(points: ComplexArray) -> ComplexArray:
+        values = state_space_response(A, B, C, D, points)
+        for power, part in enumerate(polynomial, start=1):
+            values = values + part[:, :, None] * points**power
+        return values
+
+    if polynomial:
+        zeros = zeros[:1]
+    return seen_poles(poles, response, np.abs(D)), np.concatenate(zeros)
+
+
+def _grid(modes: SeenModes, zeros: ComplexArray) -> FloatArray:
+    hidden = modes.poles[~modes.in_frequency]
+    return default_frequencies(modes.moving, visible_zeros(zeros, hidden))
+
+
 def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
-    """Give the lowest natural frequencies [rad/s] that are not zero, without damping."""
+    """Return the lowest natural frequencies [rad/s] that are not zero, without damping."""
     K, M = as_sparse(model.K), as_sparse(model.M)
     omega = np.zeros(0)
     if not (model.is_complex or is_unsymmetric(K) or is_unsymmetric(M)):
@@ -187,7 +244,7 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
             stiffness = ShiftedStiffness.factorized(K, M)
             if stiffness is not None:
                 omega = lowest_modes(stiffness, GRID_MODES).omega
-    moving = np.asarray(omega[omega > AT_ORIGIN * omega.max(initial=0.0)])
+    moving = np.asarray(omega[omega > POLE_AT_ORIGIN * omega.max(initial=0.0)])
     if moving.size == 0:
         require_regular(model)
         msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."
@@ -195,31 +252,14 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
     return moving
 
 
-def default_frequencies(poles: ComplexArray, points: int = DEFAULT_POINTS) -> FloatArray:
-    """Choose frequencies [rad/s] that show every mode.
-
-    A logarithmic grid from a tenth of the slowest to ten times the fastest pole, and around each lightly
-    damped pole the frequencies that its peak needs.
-    """
-    size = np.abs(poles)
-    moving = poles[size > AT_ORIGIN * size.max(initial=0.0)]
-    if moving.size == 0:
-        return np.geomspace(*FALLBACK_RANGE, points)
-    low, high = np.abs(moving).min() / MARGIN, np.abs(moving).max() * MARGIN
-    peaks = moving[(moving.imag > 0.0) & (np.abs(moving.real) < 0.05 * moving.imag)]
-    width = np.maximum(np.abs(peaks.real), 1e-6 * peaks.imag)
-    near = peaks.imag[:, None] + width[:, None] * np.linspace(-4.0, 4.0, 17)
-    near = near[(near > low) & (near < high)]
-    return np.unique(np.concatenate([np.geomspace(low, high, points), near]))
-
-
-def _system_frequencies(sys: control.StateSpace) -> FloatArray:
+def system_frequencies(sys: control.StateSpace, model: SecondOrderModel | None = None) -> FloatArray:
     """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency."""
-    poles, rounding = eigenvalues_and_rounding(np.asarray(sys.A, dtype=float))
     if not sys.isdtime(strict=True):
-        return default_frequencies(poles[np.abs(poles) > rounding])
+        return _grid(*system_modes(sys, model=model))
     dt = float(sys.dt)
-    frequencies = default_frequencies(np.log(poles[poles != 0.0]) / dt)
+    poles = bounded_poles(np.asarray(sys.A, dtype=float)).values
+    slow = np.log(poles[poles != 0.0]) / dt
+    frequencies = default_frequencies(slow[np.abs(slow) * dt > DISCRETE_ORIGIN])
     return np.append(frequencies[frequencies < np.pi / dt], np.pi / dt)
 
 

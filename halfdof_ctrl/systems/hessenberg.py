@@ -22,17 +22,16 @@ bound exceeds one (at the far end of a long chain) a sparse factorization of s I
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.systems.sparse_elimination import sparse_response
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
-BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
+SUBSTITUTION_BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
-UNREACHED = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
-EPS = float(np.finfo(float).eps)
-UNSAFE = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
-RISK = 1e-8  #: bound of the relative error above which a response is corrected; it exceeds the error by far
+ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
+UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
+RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
 
 
 def state_space_response(
@@ -110,7 +109,7 @@ def _refined(
     residual = b[:, None] - points * state + _real_times_complex(A, state)
     correction = (_real_times_complex(adjoint.Q, adjoint.solve(points)) * residual).sum(axis=0)
     refined = np.asarray(response + correction)
-    unsafe = np.abs(correction) > UNSAFE * np.abs(refined)
+    unsafe = np.abs(correction) > UNSAFE_CORRECTION * np.abs(refined)
     if unsafe.any():
         refined[unsafe] = sparse_response(A, b, c, points[unsafe])
     return refined
@@ -123,22 +122,22 @@ class ShiftedSolver:
         reflected, mirror, self.beta = _reflected(A, b)
         H, Q = scipy.linalg.hessenberg(reflected, calc_q=True, overwrite_a=True, check_finite=False)
         below = np.abs(np.diagonal(H, -1))
-        stops = np.flatnonzero(below <= UNREACHED * np.abs(H).max())
+        stops = np.flatnonzero(below <= ZERO_SUBDIAGONAL * np.abs(H).max())
         reached = int(stops[0]) + 1 if stops.size else H.shape[0]
         self.H = np.ascontiguousarray(H[:reached, :reached])  #: the part of H that b reaches
         self.Q = (Q - np.outer(mirror, mirror @ Q))[:, :reached]  #: (N, reached) its orthonormal basis
 
     def solve(self, points: ComplexArray) -> ComplexArray:
-        """Give x, (reached, k), in the coordinates of Q."""
+        """Return x, (reached, k), in the coordinates of Q."""
         H = self.H
         n, k = H.shape[0], points.size
         x = np.empty((n, k), dtype=np.complex128)
         x[n - 1] = 1.0
         real = x.view(np.float64)
         length = np.empty(k, dtype=np.complex128)
-        scratch = np.empty((BLOCK, 2 * k))
-        for stop in range(n, 0, -BLOCK):
-            first = max(0, stop - BLOCK)
+        scratch = np.empty((SUBSTITUTION_BLOCK, 2 * k))
+        for stop in range(n, 0, -SUBSTITUTION_BLOCK):
+            first = max(0, stop - SUBSTITUTION_BLOCK)
             sums = H[first:stop, stop - 1 :] @ real[stop - 1 :]  # row i: sum of h_ij x_j over the known j
             for i in range(stop - 1, first - 1, -1):
                 row = points * x[i]

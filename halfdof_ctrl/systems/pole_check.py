@@ -1,16 +1,16 @@
 """Poles of a state space beside the finite eigenvalues of a model, matched one to one."""
 
 import numpy as np
-import scipy.linalg
 import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import ROUNDING_OF_A, eigenvalues_and_rounding
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.spectrum import ROUNDING, eigenvalues_and_rounding
 
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding may move it
-BETWEEN = (0.0, 0.3, 0.7, 1.0)  #: parts of the way from an eigenvalue to its pole
+PARTS_OF_THE_WAY = (0.0, 0.3, 0.7, 1.0)  #: parts of the way from an eigenvalue to its pole
 
 
 def compare_poles(model: SecondOrderModel, A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[float, str]:
@@ -30,13 +30,13 @@ def compare_poles(model: SecondOrderModel, A: FloatArray, finite: ComplexArray, 
     poles, finite = poles[rows], finite[columns]
     difference = np.abs(poles - finite)
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        allowed = np.abs(finite) + (rounding[rows] + ROUNDING * gamma) / POLE_TOLERANCE
+        allowed = np.abs(finite) + (rounding[rows] + ROUNDING_OF_A * gamma) / POLE_TOLERANCE
         errors = np.where(difference > 0.0, difference / allowed, 0.0)
     for place in np.flatnonzero(errors > POLE_TOLERANCE).tolist():
         excess = _excess(model, finite[place], poles[place], gamma)
         errors[place] = min(errors[place], excess * POLE_TOLERANCE)
     worst = int(np.argmax(errors))
-    return float(errors[worst]), f"pole {in_words(poles[worst])}"
+    return float(errors[worst]), f"pole {complex_in_words(poles[worst])}"
 
 
 def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: float) -> float:
@@ -46,7 +46,7 @@ def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: 
     coordinates leaves rounding of the large terms where small ones stand alone.
     """
     distances = []
-    for part in BETWEEN:
+    for part in PARTS_OF_THE_WAY:
         s = eigenvalue + part * (pole - eigenvalue)
         at = max(abs(s), gamma)
         size = np.abs(model.K) + at * np.abs(model.C) + at**2 * np.abs(model.M)
@@ -54,11 +54,4 @@ def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: 
         scale = rows[:, None] * columns
         smallest = scipy.linalg.svdvals((model.K + s * model.C + s**2 * model.M) * scale)[-1]
         distances.append(smallest / scipy.linalg.svdvals(size * scale)[0])
-    return float(max(distances) / ROUNDING)
-
-
-def in_words(s: complex) -> str:
-    """Write a complex frequency with four digits."""
-    if s.imag == 0.0:
-        return f"{s.real:.4g}"
-    return f"{s.real:.4g}{s.imag:+.4g}j" if s.real != 0.0 else f"{s.imag:.4g}j"
+    return float(max(distances) / ROUNDING_OF_A)

@@ -7,9 +7,9 @@ zeros.
 
 import numpy as np
 
+from halfdof_ctrl.descriptor.first_order import FirstOrderPencil, first_order_pencil
 from halfdof_ctrl.descriptor.growth import system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.descriptor.first_order import FirstOrderPencil, first_order_pencil
 
 LARGEST = 1000  #: dimension of a pencil up to which slycot is asked, which takes it a second
 

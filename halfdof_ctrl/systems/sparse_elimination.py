@@ -18,8 +18,8 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Row: TypeAlias = dict[int, complex | ComplexArray]  #: entries of a matrix row by column, one or all points
 
-SPARSE = 20  #: entries per row of the factors up to which all points are worked side by side
-BACKWARD_ERROR = 1e-12  #: componentwise; a point above it is factorized by itself
+SPARSE_FACTORS = 20  #: entries per row of the factors up to which all points are worked side by side
+FACTORIZED_ALONE_ABOVE = 1e-12  #: componentwise; a point above it is factorized by itself
 
 
 def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray) -> ComplexArray:
@@ -45,7 +45,7 @@ def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: Complex
 
     try:
         factors = splu(shifted(points[points.size // 2]))
-        if factors.nnz <= SPARSE * A.shape[0]:
+        if factors.nnz <= SPARSE_FACTORS * A.shape[0]:
             values = _side_by_side(A, b, c, points, (factors.perm_r, factors.perm_c))
     except RuntimeError:  # a pole: every point is looked at by itself
         pass
@@ -73,7 +73,7 @@ def _side_by_side(
         for i, row in zip(rows, matrix, strict=True):
             terms = [value * x[q] for q, value in row.items()]
             size = sum(np.abs(term) for term in terms) + abs(b[i])
-            good &= np.abs(b[i] - sum(terms)) <= BACKWARD_ERROR * size
+            good &= np.abs(b[i] - sum(terms)) <= FACTORIZED_ALONE_ABOVE * size
         value = sum(c[old] * x[new] for old, new in place.items() if c[old] != 0.0)
     return np.where(good, value, complex(np.nan, np.nan))
 
@@ -81,7 +81,7 @@ def _side_by_side(
 def _eliminated(
     matrix: list[Row], right: list[complex | ComplexArray]
 ) -> tuple[list[Row], list[complex | ComplexArray]]:
-    """Give the upper triangle and the right-hand side after elimination."""
+    """Return the upper triangle and the right-hand side after elimination."""
     upper: list[Row] = []
     reduced: list[complex | ComplexArray] = []
     for p, given in enumerate(matrix):

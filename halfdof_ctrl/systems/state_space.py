@@ -6,18 +6,31 @@ with q = X x + U_0 u + U_1 u' + ... of equation (4). What remains of u', u'', ..
 function improper: it grows with frequency, and no state space has it.
 """
 
+import warnings
 from typing import Literal, TypeAlias
 
 import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import ImproperError, ParameterError, SignalNameError
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
+from halfdof_ctrl.base.errors import (
+    CloseDecisionWarning,
+    ImproperError,
+    ParameterError,
+    SignalNameError,
+    callers_level,
+)
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
-from halfdof_ctrl.reduction.choose import ExactReduction, exact_reduction
-from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form
+from halfdof_ctrl.reduction.energy.modal import modal_form
+from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 Improper: TypeAlias = Literal["refuse", "drop"]
 
@@ -37,6 +50,7 @@ def mech2ss(
     outputs: Names = None,
     name: str | None = None,
     improper: Improper = "refuse",
+    states: States = "dofs",
 ) -> control.StateSpace:
     """Convert a mechanical model to state space, exactly.
 
@@ -53,12 +67,21 @@ def mech2ss(
         What to do where an output follows the derivative of an input: refuse the model by name (default), or
         give the proper part ``C (s I - A)^-1 B + D`` alone; what is dropped is
         `ExactReduction.polynomial_part`.
+    states : {"dofs", "scaled", "energy", "modal"}, optional
+        What the states are; `state_map` has the way to all DOFs and back for each.
+
+        - ``"dofs"``: displacements of inertial and half DOFs and velocities of inertial ones, in their units.
+        - ``"scaled"``: the same, each DOF measured in a power of two of its unit and time in one power of two, which
+          python-control's evaluations need where stiffness ranges over many decades. The labels say which:
+          ``y_dot/2^7`` is the velocity over 2^7.
+        - ``"energy"``: strain and momentum; half the sum of their squares is the energy. Motions without stiffness
+          stand first, with columns of exact zeros. Keeps most digits; for symmetric models.
+        - ``"modal"``: energy states turned to the modes of the undamped structure, strain and momentum of each.
 
     Returns
     -------
     control.StateSpace
-        States are the displacements of inertial and half DOFs and the velocities of inertial ones. Labels
-        are the model's names, with ``.`` written as ``:`` (see `names.control_label`).
+        Labels are the model's names, with ``.`` written as ``:`` (see `~halfdof_ctrl.base.names.control_label`).
 
     Raises
     ------
@@ -70,7 +93,15 @@ def mech2ss(
         An output follows the derivative of an input, such as the velocity of a static DOF under a
         force of its own, and `improper` does not say that it is to be dropped.
     ParameterError
-        `improper` is neither of what it can be.
+        `improper` or `states` is none of what it can be.
+    EnergyFormError
+        The model has no energy or modal states: M or K unsymmetric or indefinite (constraints, follower forces), or no
+        mass or damping of its own for each DOF.
+
+    Warns
+    -----
+    CloseDecisionWarning
+        In energy or modal states, K nearly leaves a motion free.
 
     Examples
     --------
@@ -81,6 +112,7 @@ def mech2ss(
     if improper not in ("refuse", "drop"):
         msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
         raise ParameterError(msg, parameter="improper", value=improper)
+    require_kind(states)
     if isinstance(model, SecondOrderModel | ExactReduction):
         if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
@@ -94,12 +126,59 @@ def mech2ss(
     if len(output.U) > 1 and improper == "refuse":
         raise _improper_error(reduction.model, output)
     model = reduction.model
+    if states in ("energy", "modal"):
+        return _in_energy_states(reduction, states)
+    size, names = (None, reduction.states) if states == "dofs" else scaled_units(reduction)
     return labelled_system(
-        reduction.A,
-        reduction.B,
+        reduction.A if size is None else reduction.A * size / size[:, None],
+        reduction.B if size is None else reduction.B / size[:, None],
+        output.X if size is None else output.X * size,
+        output.direct(len(model.inputs)),
+        states=names,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=model.name,
+    )
+
+
+def _in_energy_states(reduction: ExactReduction, states: States) -> control.StateSpace:
+    """Make the state space in energy or modal states, of a reduction that was found to be proper."""
+    form = energy_form(reduction.model)
+    require_same_order(form, reduction)
+    if form.nearest <= NEARLY_FREE:
+        msg = (
+            f"K nearly leaves a motion free: its energy is {form.nearest:.1e} eps of the terms that it is summed from, "
+            "so that rounding of the entries of K changes it. It is kept as it stands; fewer elements, or the "
+            "stiffness in other coordinates, determine it better."
+        )
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    return energy_state_space(modal_form(form) if states == "modal" else form)
+
+
+def system_of_map(states: StateMap) -> control.StateSpace:
+    """Make the state space in the states of a map; what is improper in it is left out."""
+    model, output = states.model, states.output
+    return labelled_system(
+        states.A,
+        states.B,
         output.X,
         output.direct(len(model.inputs)),
-        states=reduction.states,
+        states=states.states,
+        inputs=model.inputs,
+        outputs=model.outputs,
+        name=model.name,
+    )
+
+
+def energy_state_space(form: EnergyForm) -> control.StateSpace:
+    """Make the state space of a model in energy coordinates; what is improper in it is left out."""
+    model, output = form.model, form.output
+    return labelled_system(
+        form.A,
+        form.B,
+        output.X,
+        output.direct(len(model.inputs)),
+        states=form.states,
         inputs=model.inputs,
         outputs=model.outputs,
         name=model.name,

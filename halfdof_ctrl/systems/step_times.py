@@ -2,36 +2,28 @@
 
 python-control takes the fastest and the slowest pole, whatever they contribute, and a fixed number of points:
 with poles 1e5 apart, or with a slow pole that no output shows, its picture misleads. Here a mode counts if
-it moves some output by more than 1e-3 of what that output does. With s = a + jb a mode of a step response is
+it moves some output by more than 1e-3 of what that output does. With the residue r_k of H at s_k (`seen_modes`) a mode
+of a step response is
 
-    c_k b_k (exp(s_k t) - 1) / s_k,    c_k = C v_k,  b_k = w_k^H B / w_k^H v_k                 (14)
-
-v_k and w_k the right and left eigenvectors of A.
+    r_k (exp(s_k t) - 1) / s_k                                                             (14)
 """
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.systems.pole_bounds import BoundedPoles
+from halfdof_ctrl.systems.seen_modes import seen_modes
 
-SETTLED = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
+SETTLING_TIME_CONSTANTS = 5.0  #: time constants after which a mode has settled, exp(-5) = 0.7 %
 MOST_PERIODS = 20  #: of a lightly damped mode; more would fill the picture
 SEEN = 200  #: a mode that settles within this fraction of the horizon is a jump to the eye
-FINE = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
-COARSE = 1.0  #: the same where FINE would take too many points: 6 points a period
+FINE_STEP = 0.2  #: step length times the size of the fastest mode that is seen: 31 points a period
+COARSEST_STEP = 1.0  #: the same where FINE_STEP would take too many points: 6 points a period
 FEWEST_STEPS = 500
-MOST_STEPS = 10_000
+MOST_TIME_STEPS = 10_000
 NO_SCALE = 1.0  #: [s] horizon of a system whose modes give none: no poles, or integrators alone
-
-INTEGRATOR = 1e-12  #: poles below this part of the largest are at the origin
-ROUNDING = 16 * np.finfo(float).eps  #: relative errors in A that may have moved a pole off the origin
-ROUNDED_ZERO = 1e-7  #: no pole above this part of the largest is taken for one that was at the origin
-RELEVANT = 1e-3  #: part of an output's movement that a mode must contribute
-NO_CHANNEL = 1e-12  #: channels that move less than this part of the largest are rounding
-SOUND = 1e-4  #: cosine between left and right eigenvectors below which (14) has terms that cancel
 
 
 def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray:
@@ -40,7 +32,7 @@ def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray
     Parameters
     ----------
     poles : (k,) array_like of complex
-        Poles [rad/s] of the modes that are seen, as `relevant_poles` gives them.
+        Poles [rad/s] of the modes that are seen, as `relevant_poles` gives them: integrators exactly zero.
     horizon : float, optional
         Last time [s]. By default the slowest mode settles (five time constants) or, lightly or not
         damped, swings 20 periods; the fastest unstable one grows by exp(5) at most. Integrators have no time
@@ -72,31 +64,34 @@ def step_times(poles: npt.ArrayLike, horizon: float | None = None) -> FloatArray
     if horizon is not None and not (np.isfinite(horizon) and horizon > 0.0):
         msg = f"The horizon of a step response must be a positive number of seconds, not {horizon}."
         raise ParameterError(msg, parameter="horizon", value=horizon)
-    moving = values[np.abs(values) > INTEGRATOR * np.abs(values).max(initial=0.0)]
+    moving = values[values != 0.0]
     end = _default_horizon(moving) if horizon is None else float(horizon)
     with np.errstate(divide="ignore", over="ignore"):
-        seen = np.abs(moving[SETTLED / np.abs(moving.real) > end / SEEN])
+        seen = np.abs(moving[SETTLING_TIME_CONSTANTS / np.abs(moving.real) > end / SEEN])
     fastest = float(seen.max(initial=0.0))
-    if horizon is None and end * fastest > COARSE * MOST_STEPS:
-        end = COARSE * MOST_STEPS / fastest
-    steps = int(np.clip(np.ceil(end * fastest / FINE), FEWEST_STEPS, MOST_STEPS))
+    if horizon is None and end * fastest > COARSEST_STEP * MOST_TIME_STEPS:
+        end = COARSEST_STEP * MOST_TIME_STEPS / fastest
+    steps = int(np.clip(np.ceil(end * fastest / FINE_STEP), FEWEST_STEPS, MOST_TIME_STEPS))
     return np.linspace(0.0, end, steps + 1)
 
 
-def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.ArrayLike) -> ComplexArray:
+def relevant_poles(
+    A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.ArrayLike, poles: BoundedPoles | None = None
+) -> ComplexArray:
     """Find the poles whose modes are seen in a step response, those at the origin as exact zeros.
 
     Parameters
     ----------
     A, B, C, D : (N, N), (N, m), (p, N), (p, m) array_like
         A continuous-time state space.
+    poles : BoundedPoles, optional
+        Eigenvalues of A, where more is known of them than A says (`model_poles`).
 
     Returns
     -------
     (k,) complex ndarray
         Poles [rad/s] of modes that reach 1e-3 of the largest term of (14), or of D, in some channel. All
-        poles where no mode does. A mode whose eigenvectors are nearly defective counts always, since its
-        term says nothing by itself.
+        poles where no mode does.
 
     Examples
     --------
@@ -108,31 +103,18 @@ def relevant_poles(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, D: npt.
     A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (A, B, C, D))
     if A.size == 0:
         return np.zeros(0, dtype=np.complex128)
-    balanced, scale = balanced_states(A)
-    values, left, right = (np.asarray(part) for part in scipy.linalg.eig(balanced, left=True, right=True))
-    product = np.einsum("ik,ik->k", left.conj(), right)
-    cosine = np.abs(product)
-    length = np.linalg.norm(right * scale[:, None], axis=0) * np.linalg.norm(left / scale[:, None], axis=0)
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        rounding = ROUNDING * np.linalg.norm(A, 2) * length / cosine
-        rounding = np.minimum(rounding, ROUNDED_ZERO * np.abs(values).max())
-        poles = np.where(np.abs(values) <= rounding, 0.0, values)
-        to_outputs, from_inputs = np.abs(C * scale @ right), np.abs(left.conj().T @ (B / scale[:, None]))
-        terms = to_outputs[:, None, :] * (from_inputs.T / (cosine * np.abs(poles)))
-    sound = (cosine > SOUND) & (poles != 0.0)
-    largest = np.maximum(terms[:, :, sound].max(axis=2, initial=0.0), np.abs(D))
-    largest = np.maximum(largest, NO_CHANNEL * largest.max(initial=0.0))
-    shown = ~sound | (terms > RELEVANT * largest[:, :, None]).any(axis=(0, 1))
-    return np.asarray(poles[shown] if shown.any() else poles, dtype=np.complex128)
+    modes = seen_modes(A, B, C, D, poles)
+    moving = modes.in_step & (modes.poles != 0.0)
+    return np.asarray(modes.poles[modes.in_step] if moving.any() else modes.poles)
 
 
 def _default_horizon(moving: ComplexArray) -> float:
-    """Give the time [s] until the slowest mode has settled or swung long enough, or an unstable one has grown."""
+    """Return the time [s] until the slowest mode has settled or swung long enough, or an unstable one has grown."""
     if moving.size == 0:
         return NO_SCALE
     with np.errstate(divide="ignore", over="ignore"):
-        settled = SETTLED / np.abs(moving.real)
+        settled = SETTLING_TIME_CONSTANTS / np.abs(moving.real)
         swung = MOST_PERIODS * 2.0 * np.pi / np.abs(moving.imag)
     end = float(np.minimum(settled, swung).max())
     growth = float(moving.real.max())
-    return min(end, SETTLED / growth) if growth > 0.0 else end
+    return min(end, SETTLING_TIME_CONSTANTS / growth) if growth > 0.0 else end

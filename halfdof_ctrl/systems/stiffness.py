@@ -8,27 +8,34 @@ The first factor is the dynamic stiffness, rows of the second the transmissibili
 g at rest r is minus the force that arrives at g: the transmissibility of force. Several DOFs in g move together.
 """
 
+import functools
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.descriptor.structure import pencil_structure, require_regular
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
-from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
-from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, MARGIN, checked_frequencies, default_frequencies
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies
+from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, checked_frequencies
+from halfdof_ctrl.systems.pencil_poles import pencil_poles
+from halfdof_ctrl.systems.phase import Source, source_of, with_source
+from halfdof_ctrl.systems.seen_modes import Response, seen_poles
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
 
 LINEAR_MARGIN = 4.0  #: evenly spread frequencies reach this factor above the modes
-KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
+TRANSMISSIBILITY_KINDS: tuple[TransmissibilityKind, ...] = get_args(TransmissibilityKind)
 
 
 def dynamic_stiffness(model: SecondOrderModel, dof: Names, s: npt.ArrayLike) -> ComplexArray:
@@ -120,8 +127,8 @@ def transmissibility(
     >>> complex(transmissibility(model, "mass", "foot", 1.0, kind="force"))
     (0.8+0j)
     """
-    if kind not in KINDS:
-        msg = f"kind must be {' or '.join(KINDS)}, not {kind!r}."
+    if kind not in TRANSMISSIBILITY_KINDS:
+        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
         raise ParameterError(msg, parameter="kind", value=kind)
     if kind == "motion":
         _require_single(to, "to", kind)
@@ -157,7 +164,8 @@ def dynamic_stiffness_response(
     frequencies = checked_frequencies(motion_frequencies([model], dof, free=True) if omega is None else omega)
     values = dynamic_stiffness(model, dof, 1j * frequencies)
     names = as_tuple(dof)
-    return _data(values, frequencies, names, reaction_names(names), model)
+    data = _data(values, frequencies, names, reaction_names(names), model)
+    return with_source(data, _stiffness_source(model, names))
 
 
 def transmissibility_response(
@@ -189,17 +197,48 @@ def transmissibility_response(
     ParameterError
         As in `transmissibility`, or frequencies that are no finite, nonnegative numbers.
     """
-    held = from_ if kind == "motion" else to
-    frequencies = checked_frequencies(motion_frequencies([model], held) if omega is None else omega)
+    held, other = (from_, to) if kind == "motion" else (to, from_)
+    grid = motion_frequencies([model], held, other=other) if omega is None else omega
+    frequencies = checked_frequencies(grid)
     values = transmissibility(model, from_, to, 1j * frequencies, kind=kind)
     causes, results = as_tuple(from_), as_tuple(to)
     if kind == "force":
         causes, results = force_names(causes), reaction_names(results)
-    return _data(values, frequencies, causes, results, model)
+    data = _data(values, frequencies, causes, results, model)
+    return with_source(data, _transmissibility_source(model, as_tuple(from_), as_tuple(to), kind))
+
+
+def _stiffness_source(model: SecondOrderModel, names: tuple[str, ...]) -> Source | None:
+    """Return the model whose transfer function the dynamic stiffness at a single DOF is."""
+    rest = _at_rest(model)
+    if len(names) > 1 or len(rest.dofs) == 1:
+        return None
+    return source_of(replace(rest, prescribed=()).prescribe_motion(names))
+
+
+def _transmissibility_source(
+    model: SecondOrderModel, from_: tuple[str, ...], to: tuple[str, ...], kind: TransmissibilityKind
+) -> Source | None:
+    """Return the model whose transfer function the transmissibility between two DOFs is."""
+    rest = replace(_at_rest(model), prescribed=())
+    if len(from_) > 1 or len(to) > 1 or len(rest.dofs) == 1 or from_ == to:
+        return None
+    if kind == "motion":
+        return source_of(rest.prescribe_motion(from_, outputs=list(to)))
+    moved = rest.prescribe_motion(to, inputs=list(force_names(from_)), outputs=list(reaction_names(to)))
+    signs: dict[str, Any] = {
+        letter: read_only(-np.asarray(getattr(moved, letter))) for letter in ("F", "G", "H", "D", "Dv", "Da")
+    }
+    return source_of(replace(moved, **signs))  # what arrives at the support is minus its reaction
 
 
 def motion_frequencies(
-    models: Sequence[SecondOrderModel], held: Names, *, free: bool = False, linear: bool = False
+    models: Sequence[SecondOrderModel],
+    held: Names,
+    *,
+    other: Names = None,
+    free: bool = False,
+    linear: bool = False,
 ) -> FloatArray:
     """Choose frequencies [rad/s] for the response of some models to the motion of a DOF.
 
@@ -208,36 +247,60 @@ def motion_frequencies(
     models : sequence of SecondOrderModel
     held : str or sequence of str
         DOFs whose motion is prescribed.
+    other : str, optional
+        DOF at the other end of a transmissibility; by default the motions of all others are looked at.
     free : bool
-        Show also the modes with these DOFs free, at which the dynamic stiffness is small.
+        For the dynamic stiffness: show also the modes with these DOFs free, at which it is small.
     linear : bool
         Spread the points evenly from 0, instead of evenly in the logarithm.
 
     Returns
     -------
     (k,) ndarray
-        From a tenth of the slowest to ten times the fastest mode, `linear` from 0 to four times the fastest, and
-        around each lightly damped mode the frequencies that its peak needs.
+        From a tenth of the slowest to ten times the fastest mode that is seen, `linear` from 0 to four times the
+        fastest, and around each lightly damped mode the frequencies that its peak needs.
     """
-    modes = [np.zeros(0, dtype=np.complex128)]
+    poles = [np.zeros(0, dtype=np.complex128)]
     for model in models:
         left = _driven(model, held)[1]
         if left is not None:
-            modes.append(pencil_structure(left).finite_eigenvalues)
-        structure = pencil_structure(_at_rest(model)) if free else None
-        if structure is not None and structure.is_regular:
-            modes.append(structure.finite_eigenvalues)
-    frequencies = default_frequencies(np.concatenate(modes))
+            shown = left.dofs if other is None else other
+            poles.append(_seen(left, functools.partial(_moved_response, model, held, None if free else shown)))
+        rest = _at_rest(model) if free else None
+        if rest is not None and pencil_structure(rest).is_regular:
+            push = _units(rest, held).sum(axis=1, keepdims=True)
+            poles.append(_seen(rest, functools.partial(_receptance, rest, push)))
+    frequencies = default_frequencies(np.concatenate(poles))
     if not linear:
         return frequencies
     top = frequencies[-1] * LINEAR_MARGIN / MARGIN
     return np.unique(np.concatenate([np.linspace(0.0, top, DEFAULT_POINTS), frequencies[frequencies < top]]))
 
 
+def _seen(model: SecondOrderModel, response: Response) -> ComplexArray:
+    """Return the poles of a model, away from the origin, that a response shows."""
+    return seen_poles(pencil_poles(model), response, np.zeros((1, 1)), real=not model.is_complex).moving
+
+
+def _moved_response(model: SecondOrderModel, held: Names, shown: Names, points: ComplexArray) -> ComplexArray:
+    """Return motions per motion of some DOFs, (p, 1, k), or with nothing to be shown their dynamic stiffness."""
+    values = _driven_response(model, held, points, shown=shown)
+    if shown is None:
+        return np.asarray(values.sum(axis=(0, 1), keepdims=True))
+    return np.asarray(values[: len(as_tuple(shown))].sum(axis=1, keepdims=True))
+
+
+def _receptance(model: SecondOrderModel, push: FloatArray, points: ComplexArray) -> ComplexArray:
+    """Return the motion of some DOFs per force on them, (1, 1, k)."""
+    none = np.zeros_like(push)
+    B, F, D = (push, none, none), (push.T, none.T, none.T), (np.zeros((1, 1)),) * 3
+    return quadratic_transfer((model.K, model.C, model.M), B, F, D, points)
+
+
 def _driven_response(
     model: SecondOrderModel, moved: Names, s: npt.ArrayLike, *, forced: Names = None, shown: Names = None
 ) -> ComplexArray:
-    """Give motions that are shown, and reactions, per force and per motion that is prescribed."""
+    """Return motions that are shown, and reactions, per force and per motion that is prescribed."""
     coefficients, left = _driven(model, moved, forced, shown)
     if left is not None:
         require_regular(left)
@@ -247,7 +310,7 @@ def _driven_response(
 def _driven(
     model: SecondOrderModel, moved: Names, forced: Names = None, shown: Names = None
 ) -> tuple[tuple[Coefficients, Coefficients, Coefficients, Coefficients], SecondOrderModel | None]:
-    """Give the coefficients of equation (1) with a motion prescribed, and the model of the DOFs left, if any."""
+    """Return the coefficients of equation (1) with a motion prescribed, and the model of the DOFs left, if any."""
     base = _at_rest(model)
     places = places_of_dofs(base, moved)
     force, motion = _units(base, forced), _units(base, shown).T
@@ -270,7 +333,7 @@ def _at_rest(model: SecondOrderModel) -> SecondOrderModel:
 
 
 def _units(model: SecondOrderModel, names: Names) -> FloatArray:
-    """Give a column for each of the DOFs with 1 in its place."""
+    """Return a column for each of the DOFs with 1 in its place."""
     places = [] if names is None else places_of_dofs(model, names)
     columns = np.zeros((len(model.dofs), len(places)))
     columns[places, range(len(places))] = 1.0
@@ -284,7 +347,7 @@ def _require_single(names: Names, parameter: str, kind: TransmissibilityKind) ->
 
 
 def _shaped(values: ComplexArray, s: npt.ArrayLike) -> ComplexArray:
-    """Give values at points the shape of the points."""
+    """Return values at points the shape of the points."""
     return values.reshape(np.shape(s))
 
 

@@ -54,7 +54,8 @@ def test_residual_is_that_of_rational_arithmetic(*, is_sparse: bool, is_complex:
     matrices = [matrix * (generator.random((n, n)) < 0.3) for matrix in matrices]
     if is_complex:
         matrices[0] = matrices[0] * (1.0 + 0.1j)
-    x = np.linalg.solve(sum(s**k * matrix for k, matrix in enumerate(matrices)) + np.eye(n), np.ones(n))
+    P = np.asarray(sum(s**k * matrix for k, matrix in enumerate(matrices)), dtype=np.complex128)
+    x = np.asarray(np.linalg.solve(P + np.eye(n), np.ones(n)), dtype=np.complex128)
     stored = [csc_array(matrix) for matrix in matrices] if is_sparse else matrices
     found = ExactPolynomial(stored).residual(s, x[:, None], np.ones((n, 1), dtype=complex))[:, 0]
     for i in range(n):

@@ -17,10 +17,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import rational
-from anykinds import ANY_KIND, Kind, in_units, signals
-from structures import Structure
-from verdict import (
+import halfdof_ctrl as hd
+from halfdof_ctrl.base.errors import ImproperError, SingularPencilError
+from halfdof_ctrl.model.second_order import LETTERS
+from support import rational
+from support.anykinds import ANY_KIND, Kind, in_units, signals
+from support.structures import Structure
+from support.verdict import (
     Improved,
     characteristic_error,
     eigenvalue_error,
@@ -29,10 +32,6 @@ from verdict import (
     roll_off_error,
     transfer_errors,
 )
-
-import halfdof_ctrl as hd
-from halfdof_ctrl.base.errors import ImproperError, SingularPencilError
-from halfdof_ctrl.model.second_order import LETTERS
 
 POINTS = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off

@@ -22,7 +22,7 @@ from scipy.sparse.linalg import splu
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from fe_models import Structure, leading_matrix, space_frame, spring_grid
+from support.fe_models import Structure, leading_matrix, space_frame, spring_grid
 
 MASSES = 50
 PATIENCE = 300.0  #: [s] after which a side counts as endless

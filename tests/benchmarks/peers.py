@@ -15,14 +15,13 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-import rational
-from anykinds import ANY_KIND, signals
-from descriptor_peers import companion, conversions, converted, massive, qz_count
-from test_benchmark_problems import REGULAR, SINGULAR
-from verdict import ComplexArray, Improved, transfer_errors
-
 import halfdof_ctrl as hd
 from halfdof_ctrl.base.errors import HalfdofError
+from support import rational
+from support.anykinds import ANY_KIND, signals
+from support.benchmark_cases import REGULAR, SINGULAR
+from support.descriptor_peers import companion, conversions, converted, massive, qz_count
+from support.verdict import ComplexArray, Improved, transfer_errors
 
 GOOD = 1e-6  #: a worse transfer function is a wrong one
 

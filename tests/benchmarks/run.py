@@ -119,7 +119,7 @@ def measure_frequency_response() -> None:
         )
         what = f"frequency_response, {states} states" + (", deep roll-off" if far_end else "")
         report(what, ours, theirs, "control.frequency_response", "(none)" if far_end else ">= 5")
-        if far_end:  # a plain solve is no reference there; tests/test_hessenberg.py has one in many digits
+        if far_end:  # a plain solve is no reference there; tests/systems/test_hessenberg.py has one in many digits
             continue
         few = omega[:: POINTS // 20]
         unit = np.eye(system.nstates)
@@ -129,6 +129,33 @@ def measure_frequency_response() -> None:
             for compute in (hd.frequency_response, control.frequency_response)
         ]
         print(f"{'':46} error against direct solves: {errors[0]:.1e} (ours) {errors[1]:.1e} (control)")
+
+
+def measure_nonlinear() -> None:
+    """Simulate the mount with turbulent oil, beside the linear state space in python-control's own simulator."""
+    times = np.arange(2001) / 200.0
+    road = np.cumsum(np.random.default_rng(14).standard_normal(times.size)) * (50.0 / np.sqrt(200.0))
+    inputs = {
+        "step": np.minimum(200.0 * times, 1.0) * 100.0,
+        "sweep": 50.0 * np.sin(2.0 * np.pi * (0.5 * times + 0.25 * times**2)),
+        "road": road - road[0],
+    }
+    linear = hd.mech2ss(hd.hydromount().select("F_y", "y"))
+    mount = hd.hydromount(C_h=0).select("F_y", "y")
+    for law in (hd.laws.quadratic(1e4), hd.laws.quadratic(1e4, 30)):
+        model = hd.nlmechss(mount, hd.Damper("y2", law=law))
+        for name, u in inputs.items():
+            size = np.abs(hd.nonlinear_response(model, times, u).states).max(axis=1)
+            options = {"method": "LSODA", "rtol": 1e-8, "atol": 1e-8 * size}
+            ours, theirs = smallest_times(
+                lambda model=model, u=u: hd.nonlinear_response(model, times, u),  # type: ignore[misc]
+                lambda u=u, options=options: control.input_output_response(  # type: ignore[misc]
+                    linear, times, u, solve_ivp_kwargs=options
+                ),
+                rounds=3,
+            )
+            target = "<= 4" if name == "step" else "<= 2"
+            report(f"nonlinear_response, {law}, {name}", ours, theirs, "linear input_output_response", target)
 
 
 def measure_import() -> None:
@@ -146,6 +173,7 @@ def main() -> None:
     print(f"{'work':46} {'ours':>13} {'other':>13}  ratio")
     measure_mount()
     measure_import()
+    measure_nonlinear()
     measure_frequency_response()
     measure_reduction()
 

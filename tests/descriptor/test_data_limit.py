@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from numpy.testing import assert_allclose
-from structures import Structure, damped_structures
-from support.slender_beam import slender_beam, tip_receptance
 
 from halfdof_ctrl import descriptor_response, mechss
 from halfdof_ctrl.base.errors import DataLimitWarning
+from support.slender_beam import slender_beam, tip_receptance
+from support.structures import Structure, damped_structures
 
 OMEGA = np.array([0.5, 1.0, 5.0, 10.0])  # rad/s, away from the resonances at 2.6 and 16.4
 DISCRETIZED = 1e-6  # relative: 3000 elements

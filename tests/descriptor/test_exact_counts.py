@@ -1,15 +1,14 @@
 """Counts modulo primes against rational arithmetic."""
 
-import exact
 import numpy as np
-import rational
-from anykinds import drawn_models
 from hypothesis import given
 from hypothesis import strategies as st
-from structures import Structure
 
 from halfdof_ctrl import SecondOrderModel
 from halfdof_ctrl.descriptor.exact_counts import exact_counts, normal_rank
+from support import exact, rational
+from support.anykinds import drawn_models
+from support.structures import Structure
 
 
 def zeros_at_origin(structure: Structure) -> int:

@@ -2,20 +2,20 @@
 
 from typing import Any
 
-import exact
 import flint
 import numpy as np
 import pytest
 import scipy.optimize
-from anykinds import drawn_models
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from structures import Structure
 
 from halfdof_ctrl import SecondOrderModel
 from halfdof_ctrl.descriptor.exact_counts import exact_counts
 from halfdof_ctrl.descriptor.finite_spectrum import FiniteSpectrum, finite_spectrum
+from support import exact
+from support.anykinds import drawn_models
+from support.structures import Structure
 
 BOUNDS = 3.0  # errors stay within so many bounds: a tenth of one in the middle
 LAST_DIGIT = 1e-15  # relative: below, an error is none

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from support.circuits import partial_element_circuit, rotated
 
 from halfdof_ctrl import mechss, pencil_structure
 from halfdof_ctrl.descriptor.found_structure import found_structure
+from support.circuits import partial_element_circuit, rotated
 
 SAME = 1e-12  # relative: eigenvalues of one circuit in two sets of coordinates
 CELLS = 30

@@ -3,7 +3,6 @@
 from itertools import combinations
 from typing import Any
 
-import exact
 import flint
 import numpy as np
 import pytest
@@ -12,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from halfdof_ctrl.descriptor.minors import invariant_zeros
+from support import exact
 
 SCATTER = 1e-6  # of simple zeros, relative to the zero or one
 

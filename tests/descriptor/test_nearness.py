@@ -1,16 +1,17 @@
 """How near a model is to a singular one."""
 
-import exact
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from structures import Structure, structures
 
 from halfdof_ctrl import mechss
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import UncertainRankError
-from halfdof_ctrl.descriptor.nearness import EPS, UNDECIDED, share_of_rounding
-from halfdof_ctrl.descriptor.structure import require_regular
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding
+from halfdof_ctrl.descriptor.regularity import require_regular
+from support import exact
+from support.structures import Structure, structures
 
 NONE = np.zeros((2, 2))
 

@@ -28,7 +28,8 @@ def drawn(seed: int, rows: int, columns: int, p: int = P) -> np.ndarray:
 
 def in_flint(matrix: np.ndarray) -> flint.nmod_mat:
     """Hand a matrix of residues to flint."""
-    return flint.nmod_mat(*matrix.shape, [int(entry) for entry in matrix.ravel()], P)
+    rows, columns = matrix.shape
+    return flint.nmod_mat(rows, columns, [int(entry) for entry in matrix.ravel()], P)
 
 
 @pytest.mark.parametrize("p", PRIMES)

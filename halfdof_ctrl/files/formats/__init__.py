@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""One file format in each file; knows `base` only."""

@@ -8,12 +8,14 @@ In the file ``job_STIF1.mtx`` (MASS: mass, DMPV: viscous damping, DMPS: structur
 with comments ``**`` and keywords ``*MATRIX``. It is no Matrix Market file in spite of its ending. Of a symmetric
 matrix one entry of each off-diagonal pair is written; an unsymmetric one has both. Nodes with a negative label are
 internal, as the multipliers of constraints. A DOF under a boundary condition has 1e36 on the diagonal of its
-stiffness.
+stiffness. ``SCALE FACTOR=`` multiplies the entries; a second ``*MATRIX INPUT`` in the file is refused. Lines without
+labels that begin to count at 0 are read so, and told. A load is ``node, DOF, value`` behind ``*CLOAD``.
 
 Source: Abaqus Analysis User's Guide, "Generating structural matrices"; Keywords Reference, ``*MATRIX INPUT``.
 """
 
 import re
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -21,6 +23,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled, completed
 from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
@@ -28,7 +31,11 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
-TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
+MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
+MATRIX_INPUT = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
+SCALE = re.compile(rb"^\*\s*matrix[^\n]*\bscale\s+factor\s*=\s*([^\s,]+)", re.IGNORECASE | re.MULTILINE)
+ELSEWHERE = re.compile(rb"^\*\s*matrix[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
+LOAD = re.compile(rb"^\*\s*cload", re.IGNORECASE | re.MULTILINE)
 LARGEST_LABEL = 2**31 - 1
 INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
 COMPONENT_BITS = 16
@@ -44,13 +51,15 @@ def data_columns(content: bytes) -> int:
     return 0
 
 
-def read_abaqus(content: bytes) -> RawMatrix:
+def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     r"""Read a matrix.
 
     Parameters
     ----------
     content : bytes
         The whole file.
+    most_rows : int
+        A larger row number is taken for damage.
 
     Raises
     ------
@@ -64,6 +73,13 @@ def read_abaqus(content: bytes) -> RawMatrix:
     (('n1_u1', 'n2_u1'), [[4.0, -1.0], [-1.0, 3.0]])
     """
     columns = data_columns(content)
+    has_keywords = b"*" in content
+    if has_keywords and (ELSEWHERE.search(content) or len(MATRIX_INPUT.findall(content)) > 1):
+        msg = (
+            "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read. Give the "
+            "file with the numbers, or write each matrix into its own."
+        )
+        raise FileFormatError(msg, path="")
     if not columns:
         msg = (
             "no line of numbers in it that Abaqus writes (node, DOF, node, DOF, value). Write it by *MATRIX OUTPUT "
@@ -71,18 +87,54 @@ def read_abaqus(content: bytes) -> RawMatrix:
         )
         raise FileFormatError(msg, path="")
     table = number_rows(content, columns, comment="*")
+    if has_keywords and columns == UNLABELLED and LOAD.search(content):
+        return _load(table, known_to(content))
     declared = _declared(content)
-    raw = _labelled(table, declared) if columns == LABELLED else _unlabelled(table, declared)
-    if declared == "unsaid" and raw.is_half_stored:
-        return completed(raw)
-    return raw
+    scale = _scale(content) if has_keywords else 1.0
+    table[:, -1] *= scale
+    raw = _labelled(table, declared) if columns == LABELLED else _unlabelled(table, declared, most_rows)
+    notes = raw.notes if scale == 1.0 else (*raw.notes, f"entries are multiplied by SCALE FACTOR={scale:g}")
+    raw = replace(raw, known_to=known_to(content), notes=notes)
+    return completed(raw) if declared == "unsaid" and raw.is_half_stored else raw
 
 
 def _declared(content: bytes) -> Declared:
-    found = TYPE.search(content[:65536])
+    found = MATRIX_TYPE.search(content[:65536])
     if found is None:
         return "unsaid"
-    return "symmetric" if found[1].lower() == b"symmetric" else "general"
+    return "symmetric" if found[1].lower() == b"symmetric" else "unsymmetric"
+
+
+def _scale(content: bytes) -> float:
+    found = SCALE.search(content)
+    if found is None:
+        return 1.0
+    try:
+        scale = float(found[1])
+    except ValueError:
+        scale = 0.0
+    if not 0.0 < abs(scale) < np.inf:
+        msg = f"SCALE FACTOR={found[1][:30].decode('latin-1')} is no number other than zero. Write it anew."
+        raise FileFormatError(msg, path="")
+    return scale
+
+
+def _load(table: FloatArray, rounding: float) -> RawMatrix:
+    """Read a load vector: node, DOF, value."""
+    labels = whole_numbers(table[:, :2], "node and DOF labels")
+    keys = _keys(labels[:, 0], labels[:, 1])
+    known, rows = np.unique(keys, return_inverse=True)
+    return assembled(
+        rows,
+        np.zeros_like(rows),
+        table[:, 2],
+        (known.size, 1),
+        declared="general",
+        format="Abaqus load",
+        letter="B",
+        dofs=_names(known),
+        known_to=rounding,
+    )
 
 
 def _labelled(table: FloatArray, declared: Declared) -> RawMatrix:
@@ -103,10 +155,12 @@ def _labelled(table: FloatArray, declared: Declared) -> RawMatrix:
     )
 
 
-def _unlabelled(table: FloatArray, declared: Declared) -> RawMatrix:
-    places = whole_numbers(table[:, :2], "row and column numbers") - 1
+def _unlabelled(table: FloatArray, declared: Declared, most_rows: int) -> RawMatrix:
+    places = whole_numbers(table[:, :2], "row and column numbers")
+    first = 0 if places.min() == 0 else 1
+    places = places - first
     size = int(places.max()) + 1
-    if size > max(MOST_ROWS, table.size):
+    if size > max(most_rows, table.size):
         msg = f"a row or column number is {size}. The file is damaged."
         raise FileFormatError(msg, path="")
     return assembled(
@@ -116,7 +170,9 @@ def _unlabelled(table: FloatArray, declared: Declared) -> RawMatrix:
         (size, size),
         declared=declared,
         format="Abaqus coordinate",
-        notes=("rows have no labels in this format",),
+        notes=("rows have no labels in this format", *(() if first else ("rows and columns are counted from 0",))),
+        open_size=True,
+        first_index=first,
     )
 
 

@@ -5,48 +5,86 @@
     *       row node                row component           real part               imaginary part
 
 Entries come in fields of 8 characters, of 16 (``*``), or between commas. Form 6 is symmetric and one entry of each pair
-is written, 1 square, 2 and 9 rectangular; TIN 3, 4 is complex. Component 0 is a scalar point. INCLUDE statements are
-not followed. Source: MSC Nastran Quick Reference Guide, entries DMIG and EXTRN.
+is written, 1 square, 2 and 9 rectangular; TIN 3, 4 is complex, with POLAR as amplitude and phase [deg]. Component 0 is
+a scalar point. INCLUDE statements are not followed, and told. A name may stand more than once.
+
+Source: MSC Nastran Quick Reference Guide, entries DMIG and EXTRN.
 """
 
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
+from halfdof_ctrl.files.formats.dmig_punch import COMPONENT_BITS, MOST_COMPONENT, punched_matrices
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import printable
 
+Keys: TypeAlias = npt.NDArray[np.int64]
+
 SMALL, LARGE = 8, 16  #: characters of a field
 SYMMETRIC, SQUARE_FORMS, COMPLEX_TYPES = 6, (1, 6), (3, 4)
-MOST_COMPONENT = 6
+FORMS, TYPES = (1, 2, 6, 9), (0, 1, 2, 3, 4)
+POLAR_FIELD = 5
+LARGEST_NODE = 2**60
 EXPONENT = re.compile(r"(?<=[0-9.])([+-])")  #: 1.5-3 and 1.5D-3 are 1.5e-3
-DMIG = re.compile(rb"^DMIG[ *,]", re.MULTILINE | re.IGNORECASE)
-EXTRN = re.compile(rb"^EXTRN[ *,]", re.MULTILINE | re.IGNORECASE)
+DMIG = re.compile(rb"^DMIG[ *,\t]", re.MULTILINE | re.IGNORECASE)
+INCLUDE = re.compile(rb"^INCLUDE\b", re.MULTILINE | re.IGNORECASE)
+EXTRN = re.compile(rb"^EXTRN[ *,\t]", re.MULTILINE | re.IGNORECASE)
 
 
 @dataclass(slots=True)
 class _Entries:
-    """A matrix while it is read."""
+    """A matrix while it is read; a key is a node, shifted, with its component."""
 
+    name: str
     form: int
     is_complex: bool
-    rows: list[tuple[int, int]] = field(default_factory=list)  #: node and component
-    columns: list[tuple[int, int]] = field(default_factory=list)
-    values: list[complex] = field(default_factory=list)
+    is_polar: bool
+    row_keys: list[int] = field(default_factory=list)
+    column_keys: list[int] = field(default_factory=list)
+    parts: list[tuple[float, float]] = field(default_factory=list)  #: real and imaginary, or amplitude and phase
+    rows: Keys = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    columns: Keys = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    values: npt.NDArray[Any] = field(default_factory=lambda: np.zeros(0))
+
+    def gathered(self) -> "_Entries":
+        """Make arrays of what was read line by line."""
+        rows, columns = (np.array(keys, dtype=np.int64) for keys in (self.row_keys, self.column_keys))
+        return self.with_entries(rows, columns, np.array(self.parts, dtype=np.float64).reshape(-1, 2))
+
+    def with_entries(self, rows: Keys, columns: Keys, parts: npt.NDArray[Any]) -> "_Entries":
+        """Give it all entries at once, two numbers each."""
+        self.rows, self.columns = rows, columns
+        first, second = parts.T
+        if not self.is_complex:
+            self.values = first
+        elif self.is_polar:
+            self.values = first * np.exp(1j * np.radians(second))
+        else:
+            self.values = first + 1j * second
+        return self
 
 
 def has_dmig(content: bytes) -> bool:
-    """Tell whether there is a DMIG entry."""
-    return DMIG.search(content) is not None
+    """Return whether there is a DMIG entry."""
+    return _has_word(content, b"DMIG") and DMIG.search(content) is not None
 
 
 def has_extrn(content: bytes) -> bool:
-    """Tell whether there is an EXTRN entry."""
-    return EXTRN.search(content) is not None
+    """Return whether there is an EXTRN entry."""
+    return _has_word(content, b"EXTRN") and EXTRN.search(content) is not None
+
+
+def _has_word(content: bytes, word: bytes) -> bool:
+    """Look for a word in its usual capitals, which is far faster than a pattern that ignores them."""
+    return any(form in content for form in (word, word.lower(), word.capitalize()))
 
 
 def read_dmig(content: bytes) -> list[RawMatrix]:
@@ -63,12 +101,41 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     >>> raw.dofs, raw.matrix.toarray().tolist()
     (('n1_u1', 'n2_u1'), [[4.0, -1.5], [-1.5, 2.0]])
     """
+    found = _punched(content) or _line_by_line(content)
+    square = [entries for entries in found if entries.form in SQUARE_FORMS and entries.rows.size]
+    doubts = ("has INCLUDE statements, which are not followed",) if INCLUDE.search(content) else ()
+    rounding = known_to(content)
+    matrices = [_assembled(entries, doubts, rounding) for entries in square]
+    if not matrices:
+        what = ", ".join(dict.fromkeys([entries.name for entries in found])) or "none"
+        msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
+        raise FileFormatError(msg, path="")
+    return matrices
+
+
+def _punched(content: bytes) -> list[_Entries]:
+    """Read the layout that Nastran itself punches, nothing of any other."""
+    try:
+        return [
+            _opened(printable(matrix.header[0].encode("latin-1")).lower(), matrix.header).with_entries(
+                matrix.rows, matrix.columns, matrix.values
+            )
+            for matrix in punched_matrices(content) or ()
+        ]
+    except (ValueError, IndexError):
+        return []
+
+
+def _line_by_line(content: bytes) -> list[_Entries]:
+    """Read any layout, with the line that is wrong."""
     found: dict[str, _Entries] = {}
+    earlier: list[_Entries] = []  #: of the same name
     for fields, line in _bulk_entries(content, "DMIG"):
         name = printable(fields[0].encode("latin-1")).lower()
         try:
             if fields[1].strip() == "0":
-                found[name] = _Entries(int(fields[2]), int(fields[3]) in COMPLEX_TYPES)
+                earlier += [found[name]] if name in found else []
+                found[name] = _opened(name, fields)
             else:
                 _add(found[name], fields)
         except KeyError as cause:
@@ -77,13 +144,7 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
         except (ValueError, IndexError) as cause:
             msg = f"a DMIG entry of {name!r} with fields that are no numbers. The file is damaged."
             raise FileFormatError(msg, path="", line=line) from cause
-    square = {name: entries for name, entries in found.items() if entries.form in SQUARE_FORMS and entries.rows}
-    matrices = [_assembled(name, entries) for name, entries in square.items()]
-    if not matrices:
-        what = ", ".join(found) or "none"
-        msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
-        raise FileFormatError(msg, path="")
-    return matrices
+    return [entries.gathered() for entries in (*earlier, *found.values())]
 
 
 def read_extrn(content: bytes) -> tuple[str, ...]:
@@ -116,25 +177,35 @@ def read_extrn(content: bytes) -> tuple[str, ...]:
     return dof_names(nodes, components)
 
 
+def _opened(name: str, fields: list[str]) -> _Entries:
+    """Read a header: form, type of the input, and whether complex values are amplitude and phase."""
+    form, kind = int(fields[2]), int(fields[3])
+    polar = int(fields[5].strip() or 0) if len(fields) > POLAR_FIELD else 0
+    if form not in FORMS or kind not in TYPES:
+        msg = f"form {form} and type {kind} are none of DMIG"
+        raise ValueError(msg)
+    return _Entries(name, form, kind in COMPLEX_TYPES, polar > 0)
+
+
 def _add(entries: _Entries, fields: list[str]) -> None:
     """Add the rows of one column."""
-    column = _place(fields[1], fields[2])
+    column = _key(fields[1], fields[2])
     for start in range(4, len(fields), 4):
         group = [text.strip() for text in fields[start : start + 4]]
         if not any(group):
             continue
         real, imaginary = (_real(text) for text in [*group, "", ""][2:4])
-        entries.rows.append(_place(group[0], group[1]))
-        entries.columns.append(column)
-        entries.values.append(complex(real, imaginary if entries.is_complex else 0.0))
+        entries.row_keys.append(_key(group[0], group[1]))
+        entries.column_keys.append(column)
+        entries.parts.append((real, imaginary))
 
 
-def _place(node: str, component: str) -> tuple[int, int]:
+def _key(node: str, component: str) -> int:
     place = int(node), int(component or 0)
-    if place[0] <= 0 or not 0 <= place[1] <= MOST_COMPONENT:
+    if not 0 < place[0] < LARGEST_NODE or not 0 <= place[1] <= MOST_COMPONENT:
         msg = "no node"
         raise ValueError(msg)
-    return place
+    return (place[0] << COMPONENT_BITS) + place[1]
 
 
 def _real(text: str) -> float:
@@ -153,25 +224,28 @@ def _real(text: str) -> float:
     return value
 
 
-def _assembled(name: str, entries: _Entries) -> RawMatrix:
-    places = sorted({*entries.rows, *entries.columns})
-    number = {place: index for index, place in enumerate(places)}
-    values = np.array(entries.values, dtype=np.complex128)
+def _assembled(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> RawMatrix:
+    known = np.union1d(entries.rows, entries.columns)
+    values = entries.values
     declared: Declared = "symmetric" if entries.form == SYMMETRIC else "general"
+    nodes, components = known >> COMPONENT_BITS, known & (2**COMPONENT_BITS - 1)
     return assembled(
-        np.array([number[place] for place in entries.rows], dtype=np.int64),
-        np.array([number[place] for place in entries.columns], dtype=np.int64),
-        values if values.imag.any() else values.real,
-        (len(places), len(places)),
+        np.searchsorted(known, entries.rows),
+        np.searchsorted(known, entries.columns),
+        values if np.iscomplexobj(values) and values.imag.any() else values.real,
+        (known.size, known.size),
         declared=declared,
         format=f"Nastran DMIG, form {entries.form}",
-        title=name,
-        dofs=dof_names(*zip(*places, strict=True)),
+        title=entries.name,
+        named=True,
+        dofs=dof_names(nodes.tolist(), components.tolist()),
+        doubts=doubts,
+        known_to=rounding,
     )
 
 
 def _bulk_entries(content: bytes, keyword: str) -> Iterator[tuple[list[str], int]]:
-    """Give the data fields of each entry of a keyword, without continuation marks, and the line it starts at."""
+    """Return the data fields of each entry of a keyword, without continuation marks, and the line it starts at."""
     fields: list[str] | None = None
     start = 0
     for number, whole in enumerate(content.split(b"\n"), start=1):

@@ -21,17 +21,17 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import WORD, ansys_name
-from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, Lines, fixed_width, printable, whole_numbers
+from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled, most_rows
+from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, LONGEST_LINE, Lines, fixed_width, printable, whole_numbers
 
-TYPE = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
+TYPE_LETTERS = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
 FORMATS = re.compile(rb"\(((?:[^()]|\([^()]*\))*)\)")
 DESCRIPTOR = re.compile(r"^(?:([+-]?\d+)P,?)?(\d*)\(?([IDEFG])(\d+)(?:\.\d+)?(?:E\d+)?\)?$")
-SYMMETRIES: dict[str, Declared] = {"S": "symmetric", "Z": "skew-symmetric", "U": "general", "R": "general"}
+SYMMETRY_OF_LETTER: dict[str, Declared] = {"S": "symmetric", "Z": "skew-symmetric", "U": "general", "R": "general"}
 TITLES = {"stiff": "K", "mass": "M", "damp": "C"}  #: first word of ANSYS's titles
 HEADER_LINES = 4
-LONGEST_LINE = 1024  #: characters; Fortran's own limit is 132
 SECTIONS = ("pointers", "row numbers", "values")
 MAPPING_FIELDS = 3
 
@@ -51,7 +51,7 @@ class _Header:
 def is_harwell_boeing(content: bytes) -> bool:
     """Tell by the type in the third line."""
     lines = content[:1024].split(b"\n", 3)
-    return len(lines) > HEADER_LINES - 1 and TYPE.match(lines[2]) is not None and lines[1].split()[:1] != []
+    return len(lines) > HEADER_LINES - 1 and TYPE_LETTERS.match(lines[2]) is not None and lines[1].split()[:1] != []
 
 
 def read_harwell_boeing(content: bytes) -> RawMatrix:
@@ -92,11 +92,12 @@ def read_harwell_boeing(content: bytes) -> RawMatrix:
         np.repeat(np.arange(columns), lengths),
         parts[2],
         (rows, columns),
-        declared=SYMMETRIES[header.kind[1]],
+        declared=SYMMETRY_OF_LETTER[header.kind[1]],
         format=f"Harwell-Boeing {header.kind}",
         title=header.title,
         letter=letter,
         notes=notes,
+        known_to=known_to(content),
     )
 
 
@@ -136,13 +137,13 @@ def _header(lines: Lines, length: int) -> _Header:
         raise FileFormatError(msg, path="")
     cards = _numbers(lines[1], 4, 2)
     kind = lines[2][:3].decode("latin-1").upper()
-    if kind[0] != "R" or kind[1] not in SYMMETRIES or kind[2] != "A":
+    if kind[0] != "R" or kind[1] not in SYMMETRY_OF_LETTER or kind[2] != "A":
         msg = f"it holds a matrix of type {kind!r}; real assembled ones are read (RSA, RUA, RZA)."
         raise FileFormatError(msg, path="", line=3)
     rows, columns, entries = _numbers(lines[2][3:], 3, 3)[:3]
     right_hand_sides = cards[4] if len(cards) > HEADER_LINES else 0
     first = HEADER_LINES + (right_hand_sides > 0)
-    if max(rows, columns) > max(MOST_ROWS, length) or first + sum(cards[1:4]) > len(lines):
+    if max(rows, columns) > most_rows(length) or first + sum(cards[1:4]) > len(lines):
         msg = (
             f"it says {rows} x {columns} with {sum(cards[1:4])} lines of data, but has {len(lines)} lines. It is "
             "damaged or cut short."

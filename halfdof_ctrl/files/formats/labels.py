@@ -45,6 +45,6 @@ def ansys_name(node: int, label: str) -> str:
 
 
 def direction_of(name: str) -> str | None:
-    """Give the direction u1, u2 or u3 of a node's translation, and None for any other name."""
+    """Return the direction u1, u2 or u3 of a node's translation, and None for any other name."""
     ending = name[-2:]
     return ending if ending in TRANSLATIONS and name.startswith("n") and name[-3:-2] == "_" else None

@@ -1,17 +1,19 @@
-"""Read matrices and names from MATLAB version 5 files, byte by byte and in bounds.
+"""Matrices and names from MATLAB version 5 files, byte by byte and in bounds.
 
 `scipy.io.loadmat` (1.17) follows the lengths that a file states and crashes the interpreter on damaged
 ones; here every length is checked against the bytes that there are. Numbers (full or sparse, real or complex),
-char arrays and cell arrays of chars are read, which is what a model file holds.
+char arrays and cell arrays of chars are read, which is what a model file holds; matrices in structs and cell arrays
+by a longer name, ``sys.K`` and ``K{2}``.
 
 Layout (MathWorks, MAT-File Format): a header of 128 bytes, then elements of an 8-byte tag (type, length) and
 data padded to 8 bytes; up to four bytes of data may stand in the tag itself.
 """
 
 import zlib
-from collections.abc import Collection
-from dataclasses import dataclass
-from typing import Any, TypeAlias
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,35 +22,38 @@ from scipy.sparse import csc_array
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
+from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, require_room
 
-Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
-
-HEADER = 128  #: bytes; the last two tell the byte order
+MAT5_HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
-MOST_BYTES = 16 * DENSE_ROW_LIMIT**2 + 2**16  #: of one complex matrix with its tags
-PEEK = 2**12  #: bytes that hold the name of a variable
+NAME_PEEK = 2**12  #: bytes that hold the name of a variable
 MATRIX, COMPRESSED = 14, 15
-NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-TEXTS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
-CELL, CHAR, SPARSE, OPAQUE = 1, 4, 5, 17
+NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+TEXT_ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
+CELL, STRUCT, CHAR, SPARSE, OPAQUE = 1, 2, 4, 5, 17
+DEEPEST = 4  #: structs in structs that are looked into
 NUMERIC = range(6, 16)
 COMPLEX_FLAG, LOGICAL_FLAG = 0x800, 0x200
 
 
 def read_mat(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
-    """Read the wanted variables of a MATLAB version 5 file.
+    """Read the wanted variables of a MATLAB version 5 file, see `mat5_variables`."""
+    return {variable.name: variable.read() for variable in mat5_variables(content) if variable.name in wanted}
+
+
+def mat5_variables(content: bytes) -> list[Variable]:
+    """Describe the variables of a MATLAB version 5 file.
 
     Parameters
     ----------
     content : bytes
         The whole file.
-    wanted : collection of str
-        Names; other variables are not looked at.
 
     Returns
     -------
-    dict from name to ndarray, csc_array or list of str
-        Char arrays give a text a row, cell arrays of chars a text a cell, without blanks at their ends.
+    list of Variable
+        Read as ndarray, csc_array or list of str: char arrays give a text a row, cell arrays of chars a text a cell,
+        without blanks at their ends.
 
     Raises
     ------
@@ -57,30 +62,91 @@ def read_mat(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
     ValueError, zlib.error
         The bytes are damaged or end too early.
     """
-    if content.startswith(b"MATLAB 7.3") or content[HEADER - 4 : HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
+    if content.startswith(b"MATLAB 7.3") or content[MAT5_HEADER - 4 : MAT5_HEADER] in (b"\x00\x02IM", b"\x02\x00MI"):
         msg = "this is a MATLAB 7.3 (HDF5) file. Save it with  save(file, ..., '-v7')."
         raise FileFormatError(msg, path="")
-    order = {b"IM": "<", b"MI": ">"}.get(content[HEADER - 2 : HEADER])
+    order = {b"IM": "<", b"MI": ">"}.get(content[MAT5_HEADER - 2 : MAT5_HEADER])
     if order is None:
         msg = "this is no MATLAB version 5 file (or only the beginning of one). Save it with  save(file, ..., '-v7')."
         raise FileFormatError(msg, path="")
-    found: dict[str, Value] = {}
-    elements = _Bytes(content[HEADER:], order)
+    return [_described(*packed, order) for packed in _packed_variables(content, order)]
+
+
+def _packed_variables(content: bytes, order: str) -> list[tuple[int, bytes]]:
+    elements = _Bytes(content, order, MAT5_HEADER)
+    found = []
     while elements:
-        kind, data = elements.element()
-        packed = kind == COMPRESSED
-        head = _Head.of(_variable(*(_peeked(data, order) if packed else (kind, data)), order))
-        if head.name in wanted:
-            body = _variable(*(_inflated(data, order) if packed else (kind, data)), order)
-            found[head.name] = _value(_Head.of(body), body)
+        found.append(elements.element())
     return found
+
+
+def _described(kind: int, data: bytes, order: str) -> Variable:
+    """Describe one variable by its beginning; the rest is unpacked when it is read."""
+    packed = kind == COMPRESSED
+    head = _Head.of(_variable(*(_peeked(data, order) if packed else (kind, data)), order))
+
+    def body() -> tuple[_Head, _Bytes]:
+        whole = _variable(*(_inflated(head.name, data, order) if packed else (kind, data)), order)
+        return _Head.of(whole), whole
+
+    return _as_variable(head.name, head, body, DEEPEST)
+
+
+def _as_variable(name: str, head: "_Head", body: Callable[[], "tuple[_Head, _Bytes]"], depth: int) -> Variable:
+    def read() -> Value:
+        its, rest = body()
+        return _value(replace(its, name=name), rest)
+
+    def parts() -> list[Variable]:
+        its, rest = body()
+        return list(_parts(name, its, rest, depth - 1)) if depth else []
+
+    return Variable(name=name, kind=_kind(head), shape=head.shape, read=read, parts=parts)
+
+
+def _kind(head: "_Head") -> Kind:
+    if head.kind in NUMERIC or head.kind == SPARSE:
+        return "matrix"
+    kinds: dict[int, Kind] = {CHAR: "text", CELL: "cell", STRUCT: "struct"}
+    return kinds.get(head.kind, "object")
+
+
+def _parts(name: str, head: "_Head", body: "_Bytes", depth: int) -> list[Variable]:
+    """Describe the fields of a struct or the cells of a cell array, under the names by which MATLAB calls them."""
+    fields = _field_names(body) if head.kind == STRUCT else [""]
+    total = min(_count(head.shape), MOST_PARTS)
+    found = []
+    for index in range(total):
+        for field in fields:
+            own = f"({index + 1})" if head.kind == STRUCT and total > 1 else f"{{{index + 1}}}"
+            called = f"{name}{'' if head.kind == STRUCT and total == 1 else own}{f'.{field}' if field else ''}"
+            kind, data = body.element()
+            if kind == MATRIX and data:
+                again = partial(_again, data, body.order)
+                found.append(_as_variable(called, again()[0], again, depth))
+    return found
+
+
+def _again(data: bytes, order: str) -> "tuple[_Head, _Bytes]":
+    body = _Bytes(data, order)
+    return _Head.of(body), body
+
+
+def _field_names(body: "_Bytes") -> list[str]:
+    width = int(body.numbers()[0])
+    _, names = body.element()
+    if width < 1 or len(names) > MOST_PARTS * width:
+        msg = "a struct without sound names of its fields"
+        raise ValueError(msg)
+    cut = [names[start : start + width].split(b"\0")[0] for start in range(0, len(names), width)]
+    return [name.decode("latin-1") for name in cut]
 
 
 class _Bytes:
     """Elements one after the other; none reaches past the end."""
 
-    def __init__(self, data: bytes, order: str) -> None:
-        self.data, self.order, self.position = data, order, 0
+    def __init__(self, data: bytes, order: str, position: int = 0) -> None:
+        self.data, self.order, self.position = data, order, position
 
     def __bool__(self) -> bool:
         return self.position < len(self.data)
@@ -94,7 +160,7 @@ class _Bytes:
         return part
 
     def element(self) -> tuple[int, bytes]:
-        """Give type and data of the next element."""
+        """Return type and data of the next element."""
         tag = self.take(TAG)
         kind, length = np.frombuffer(tag, self.order + "u4").tolist()
         if kind >> 16:
@@ -105,14 +171,14 @@ class _Bytes:
         return kind, data
 
     def numbers(self) -> npt.NDArray[Any]:
-        """Give the next element as numbers."""
+        """Return the next element as numbers."""
         return self.as_numbers(*self.element())
 
     def as_numbers(self, kind: int, data: bytes) -> npt.NDArray[Any]:
-        if kind not in NUMBERS:
+        if kind not in NUMBER_TYPES:
             msg = f"an element of type {kind} where numbers should be"
             raise ValueError(msg)
-        return np.frombuffer(data, self.order + NUMBERS[kind])
+        return np.frombuffer(data, self.order + NUMBER_TYPES[kind])
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,18 +212,16 @@ def _variable(kind: int, data: bytes, order: str) -> _Bytes:
 
 def _peeked(data: bytes, order: str) -> tuple[int, bytes]:
     """Unpack the beginning of a variable."""
-    start = zlib.decompressobj().decompress(data, PEEK)
+    start = zlib.decompressobj().decompress(data, NAME_PEEK)
     kind, _ = np.frombuffer(_Bytes(start, order).take(TAG), order + "u4").tolist()
     return kind, start[TAG:]
 
 
-def _inflated(data: bytes, order: str) -> tuple[int, bytes]:
+def _inflated(name: str, data: bytes, order: str) -> tuple[int, bytes]:
     """Unpack one variable to its stated length, with its checksum."""
     stream = zlib.decompressobj()
     kind, length = np.frombuffer(stream.decompress(data, TAG), order + "u4").tolist()
-    if length > MOST_BYTES:
-        msg = f"a variable has {length} bytes, and only {MOST_BYTES:.0e} are read. Reduce the model first."
-        raise FileFormatError(msg, path="")
+    require_room(name, length, len(data))
     body = stream.decompress(stream.unconsumed_tail, length + 1)
     if len(body) != length or not stream.eof:
         msg = "a packed variable is not as long as it says"
@@ -174,11 +238,7 @@ def _value(head: _Head, body: _Bytes) -> Value:
         return _rows(head, body)
     if head.kind == CELL:
         return [_cell(head.name, body) for _ in range(_count(head.shape))]
-    msg = (
-        f"{head.name} is a struct, string or other object, where numbers or names should be. Save plain matrices, and "
-        "names as cellstr."
-    )
-    raise FileFormatError(msg, path="")
+    raise another_kind(head.name)
 
 
 def _count(shape: tuple[int, ...]) -> int:
@@ -238,7 +298,11 @@ def _cell(name: str, body: _Bytes) -> str:
     inner = _Bytes(data, body.order)
     head = _Head.of(inner)
     if kind != MATRIX or head.kind != CHAR or head.shape[0] > 1:
-        msg = f"{name} must be a cell array of names, one char row each (in MATLAB a cellstr)."
+        what = "matrices" if kind == MATRIX and (head.kind in NUMERIC or head.kind == SPARSE) else "other things"
+        msg = (
+            f"{name} must be a cell array of names, one char row each (in MATLAB a cellstr), or a matrix, but it is a "
+            f"cell array of {what}. A matrix in it is called '{name}{{1}}'."
+        )
         raise FileFormatError(msg, path="")
     return next(iter(_rows(head, inner)), "")
 
@@ -246,9 +310,9 @@ def _cell(name: str, body: _Bytes) -> str:
 def _rows(head: _Head, body: _Bytes) -> list[str]:
     """Read a char array, which is stored by columns, as one text a row."""
     kind, data = body.element()
-    if kind in TEXTS:
+    if kind in TEXT_ENCODINGS:
         ending = {"<": "-le", ">": "-be"}[body.order] if kind in (17, 18) else ""
-        text = data.decode(TEXTS[kind] + ending)
+        text = data.decode(TEXT_ENCODINGS[kind] + ending)
     else:
         text = body.as_numbers(kind, data).astype("<u2").tobytes().decode("utf-16-le")
     letters = np.array(list(text), dtype=np.str_) if len(text) == _count(head.shape) else _units(text)

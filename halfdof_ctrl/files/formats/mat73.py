@@ -1,4 +1,4 @@
-"""Read matrices and names from MATLAB version 7.3 files, which are HDF5 files, through h5py (extra ``hdf5``).
+"""Matrices and names from MATLAB version 7.3 files, which are HDF5 files, through h5py (extra ``hdf5``).
 
 A full matrix is a dataset with its axes reversed. A sparse one is a group with the attribute MATLAB_sparse (rows) and
 the datasets ``data``, ``ir`` (row numbers) and ``jc`` (starts of the columns). Text is a dataset of 16-bit units, a
@@ -9,7 +9,8 @@ anything is read.
 import importlib
 import io
 from collections.abc import Collection
-from typing import Any, TypeAlias
+from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +19,13 @@ from scipy.sparse import csc_array
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError, MissingExtraError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-
-Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
+from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, most_unpacked
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 USER_BLOCK = 512  #: bytes that MATLAB puts before it
 EXTRA = "hdf5"
-COMPRESSION = 1100  #: the most that deflate makes of a byte
+MOST_DEPTH = 4  #: structs in structs that are looked into
+OWN = "#"  #: begins the names of groups that MATLAB keeps for itself
 REAL_KINDS = "biuf"
 
 
@@ -62,9 +63,87 @@ def read_mat73(content: bytes, wanted: Collection[str]) -> dict[str, Value]:
         with h5py.File(io.BytesIO(content), "r") as file:
             names = [name for name in wanted if isinstance(file.get(name, getlink=True), h5py.HardLink)]
             return {name: _value(file, file[name], name, len(content)) for name in names}
-    except OSError as cause:  # of the library, not of the file system: the bytes are in memory
-        msg = f"the HDF5 structure is damaged ({' '.join(str(cause).split())}). Write it anew."
-        raise FileFormatError(msg, path="") from cause
+    except OSError as cause:
+        raise _damaged(cause) from cause
+
+
+def mat73_variables(content: bytes) -> list[Variable]:
+    """Describe the variables of a MATLAB version 7.3 file; structs and cell arrays by their parts too.
+
+    Raises
+    ------
+    MissingExtraError
+        h5py is not installed.
+    FileFormatError
+        The structure is damaged.
+    """
+    h5py = _h5py()
+    try:
+        with h5py.File(io.BytesIO(content), "r") as file:
+            return _listed(content, file, file, "", [MOST_PARTS])
+    except OSError as cause:
+        raise _damaged(cause) from cause
+
+
+def _listed(content: bytes, file: Any, group: Any, before: str, room: list[int]) -> list[Variable]:  # noqa: ANN401
+    """Describe what a group holds, up to a number of parts in all: groups may hold each other."""
+    h5py = _h5py()
+    found = []
+    for key in group:
+        room[0] -= 1
+        if room[0] < 0:
+            break
+        if not key.startswith(OWN) and isinstance(group.get(key, getlink=True), h5py.HardLink):
+            found.append(_described(content, file, group[key], (f"{before}{key}", group[key].name), room))
+    return found
+
+
+def _described(content: bytes, file: Any, item: Any, names: tuple[str, str], room: list[int]) -> Variable:  # noqa: ANN401
+    """Describe a variable by its attributes; `names` are what it is called and where it is."""
+    name, where = names
+    kind: Kind = "object"
+    shape: tuple[int, ...] = ()
+    parts: list[Variable] = []
+    if "MATLAB_sparse" in item.attrs:
+        columns = item["jc"].shape[0] - 1 if "jc" in item and item["jc"].shape else 0
+        kind, shape = "matrix", (int(item.attrs["MATLAB_sparse"]), columns)
+    elif not hasattr(item, "dtype"):
+        kind, parts = "struct", _listed(content, file, item, f"{name}.", room) if name.count(".") < MOST_DEPTH else []
+    elif item.dtype.kind == "O":
+        kind, parts = "cell", _cells(content, file, item, name, room)
+    elif _is_char(item):
+        kind = "text"
+    elif item.dtype.kind in REAL_KINDS or item.dtype.names == ("real", "imag"):
+        kind, shape = "matrix", tuple(reversed(item.shape or ()))
+    return Variable(
+        name=name, kind=kind, shape=shape, read=partial(_read_again, content, where, name), parts=lambda: parts
+    )
+
+
+def _cells(content: bytes, file: Any, item: Any, name: str, room: list[int]) -> list[Variable]:  # noqa: ANN401
+    if _h5py().check_ref_dtype(item.dtype) is None or not item.size or item.size > MOST_PARTS:
+        return []
+    cells = [file[reference] for reference in _checked(item, name, len(content)).reshape(-1).tolist() if reference]
+    flat = [(number, cell) for number, cell in enumerate(cells, start=1) if not _is_cell(cell)]
+    return [_described(content, file, cell, (f"{name}{{{number}}}", cell.name), room) for number, cell in flat]
+
+
+def _is_cell(item: Any) -> bool:  # noqa: ANN401
+    return hasattr(item, "dtype") and item.dtype.kind == "O"
+
+
+def _read_again(content: bytes, where: str, name: str) -> Value:
+    try:
+        with _h5py().File(io.BytesIO(content), "r") as file:
+            return _value(file, file[where], name, len(content))
+    except OSError as cause:
+        raise _damaged(cause) from cause
+
+
+def _damaged(cause: OSError) -> FileFormatError:
+    """Name what the library says: the bytes are in memory, so it is not the file system."""
+    msg = f"the HDF5 structure is damaged ({' '.join(str(cause).split())}). Write it anew."
+    return FileFormatError(msg, path="")
 
 
 def _h5py() -> Any:  # noqa: ANN401  # a module that need not be there
@@ -82,16 +161,16 @@ def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN4
     if "MATLAB_sparse" in item.attrs:
         return _sparse(item, name, length)
     if not hasattr(item, "dtype"):
-        raise _another_kind(name)
+        raise another_kind(name)
     data = _checked(item, name, length)
     if item.attrs.get("MATLAB_empty", 0):
         return []
     if item.dtype.kind == "O":
         if _h5py().check_ref_dtype(item.dtype) is None:
-            raise _another_kind(name)
+            raise another_kind(name)
         cells = [file[reference] for reference in data.reshape(-1).tolist()]
         if not all(_is_char(cell) and len(cell.shape) == 2 and 1 in cell.shape for cell in cells):  # noqa: PLR2004
-            raise _another_kind(name)
+            raise another_kind(name)
         return [row for cell in cells for row in _rows(_checked(cell, name, length))]
     if _is_char(item):
         return _rows(data)
@@ -103,7 +182,7 @@ def _checked(item: Any, name: str, length: int) -> npt.NDArray[Any]:  # noqa: AN
     if item.is_virtual or item.external:
         msg = f"{name} lies in another file. Save it into one."
         raise FileFormatError(msg, path="")
-    most = min(length * COMPRESSION, 16 * DENSE_ROW_LIMIT**2) if item.chunks else length
+    most = min(most_unpacked(length), 16 * DENSE_ROW_LIMIT**2) if item.chunks else length
     if item.size is not None and item.size * item.dtype.itemsize > most:
         msg = (
             f"{name} has {item.size} entries, more than are read from a file of {length} bytes. Reduce the model first."
@@ -134,7 +213,7 @@ def _numbers(data: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:
         values.real, values.imag = data["real"], data["imag"]
         return values
     if data.dtype.kind not in REAL_KINDS:
-        raise _another_kind(name)
+        raise another_kind(name)
     return data.astype(np.float64)
 
 
@@ -146,11 +225,3 @@ def _rows(units: npt.NDArray[Any]) -> list[str]:
     """Read 16-bit units, one text a column of the dataset."""
     table = units.astype("<u2").reshape(units.shape[0], -1) if units.ndim else units.reshape(1, 1)
     return [np.ascontiguousarray(column).tobytes().decode("utf-16-le").rstrip(" ") for column in table.T]
-
-
-def _another_kind(name: str) -> FileFormatError:
-    msg = (
-        f"{name} is a struct, string or other object, where numbers or names should be. Save plain matrices, and "
-        "names as cellstr."
-    )
-    return FileFormatError(msg, path="")

@@ -14,28 +14,37 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
+from halfdof_ctrl.files.formats.text_blocks import BOM, number_rows, whole_numbers
 
 BANNER = b"%%matrixmarket"
+BANNER_PEEK = 256  #: bytes in which the banner begins
 LAYOUTS = ("coordinate", "array")
 FIELDS = {"real": 1, "double": 1, "integer": 1, "unsigned-integer": 1, "complex": 2}  #: numbers of a value
 SYMMETRIES = ("general", "symmetric", "skew-symmetric")
-SIZES = {"coordinate": 3, "array": 2}
+SIZES_OF_LAYOUT = {"coordinate": 3, "array": 2}
 
 
 def is_matrix_market(content: bytes) -> bool:
     """Tell by the banner."""
-    return content[: len(BANNER)].lower() == BANNER
+    return _begun(content[:BANNER_PEEK])[: len(BANNER)].lower() == BANNER
 
 
-def read_matrix_market(content: bytes) -> RawMatrix:
+def _begun(content: bytes) -> bytes:
+    """Take away the byte order mark of Windows and blanks before the banner, which some programs write."""
+    return content.removeprefix(BOM).lstrip(b" \t\r\n")
+
+
+def read_matrix_market(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     r"""Read a matrix.
 
     Parameters
     ----------
     content : bytes
         The whole file.
+    most_rows : int
+        A larger size is taken for damage.
 
     Raises
     ------
@@ -49,8 +58,9 @@ def read_matrix_market(content: bytes) -> RawMatrix:
     >>> read_matrix_market(text).matrix.toarray().tolist()
     [[2.0, -1.0], [-1.0, 3.0]]
     """
+    content = _begun(content)
     layout, field, symmetry = _kind(content)
-    sizes, start, line = _sizes(content, SIZES[layout])
+    sizes, start, line = _sizes(content, SIZES_OF_LAYOUT[layout], most_rows)
     rows, columns = sizes[0], sizes[1]
     if layout == "coordinate":
         i, j, values = _coordinate(content[start:], FIELDS[field], sizes[2], line)
@@ -63,6 +73,7 @@ def read_matrix_market(content: bytes) -> RawMatrix:
         (rows, columns),
         declared=cast("Declared", symmetry),
         format=f"Matrix Market {layout} {field} {symmetry}",
+        known_to=known_to(content[start:]),
     )
 
 
@@ -78,27 +89,34 @@ def _kind(content: bytes) -> tuple[str, str, str]:
     return words[2], words[3], words[4]
 
 
-def _sizes(content: bytes, count: int) -> tuple[list[int], int, int]:
-    """Give the sizes, where the entries start, and the line there."""
+def _sizes(content: bytes, count: int, most_rows: int) -> tuple[list[int], int, int]:
+    """Return the sizes, where the entries start, and the line there."""
     start, line = content.find(b"\n") + 1, 2
     while start:
         stop = content.find(b"\n", start)
         text = content[start : stop if stop >= 0 else len(content)].strip()
         if text and not text.startswith(b"%"):
-            return _checked_sizes(text.split(), count, len(content), line), stop + 1 or len(content), line + 1
+            return (
+                _checked_sizes(text.split(), count, (most_rows, len(content)), line),
+                stop + 1 or len(content),
+                line + 1,
+            )
         start, line = stop + 1, line + 1
     msg = "it ends before the line of sizes. Write it anew."
     raise FileFormatError(msg, path="")
 
 
-def _checked_sizes(fields: Sequence[bytes], count: int, length: int, line: int) -> list[int]:
+def _checked_sizes(fields: Sequence[bytes], count: int, room: tuple[int, int], line: int) -> list[int]:
     if len(fields) != count or not all(field.isdigit() for field in fields):
         shown = b" ".join(fields)[:60].decode("latin-1")
         msg = f"{count} sizes belong here, not {shown!r}. The file is damaged."
         raise FileFormatError(msg, path="", line=line)
     sizes = [int(field) for field in fields]
-    if not (sizes[0] and sizes[1]) or max(sizes[:2]) > max(MOST_ROWS, length):
-        msg = f"a matrix of {sizes[0]} x {sizes[1]} in a file of {length} bytes. The file is damaged."
+    if not (sizes[0] and sizes[1]) or max(sizes[:2]) > max(room):
+        msg = (
+            f"a matrix of {sizes[0]} x {sizes[1]} in a file of {room[1]} bytes. It is damaged, or one of a model: give "
+            "all files."
+        )
         raise FileFormatError(msg, path="", line=line)
     return sizes
 
@@ -113,7 +131,7 @@ def _coordinate(content: bytes, numbers: int, count: int, line: int) -> tuple[np
 def _array(
     content: bytes, numbers: int, shape: tuple[int, int], symmetry: str, line: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Give the entries of an array, whose triangle is stored if it is symmetric."""
+    """Return the entries of an array, whose triangle is stored if it is symmetric."""
     rows, columns = shape
     first = {"general": 0, "symmetric": 0, "skew-symmetric": 1}[symmetry]
     stored = rows * columns if symmetry == "general" else rows * (rows + 1) // 2 - first * rows

@@ -8,8 +8,11 @@ its number, the first row and the count of words, and a last one whose number is
     big sparse   rows < 0          then strings of (length, row) and values
 
 In binary each record stands between two counts of its bytes (little or big endian, words of 4 or 8 bytes). All counts
-are checked against the bytes or lines that there are. Form 6 is symmetric; types 1, 2 are real (single, double), 3, 4
-complex. Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
+are checked against the bytes or lines that there are. Form 6 is symmetric, 3 a diagonal (stored as one column or
+whole), 8 an identity whose columns are not stored; factors (4, 5, 10, 13, 15) are called so. Types 1, 2 are real
+(single, double), 3, 4 complex. With words of 8 bytes each holds 4 characters of a name.
+
+Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
 """
 
 import re
@@ -21,20 +24,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import FileFormatError
-from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import Lines, fixed_width, printable
+from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING, known_to
+from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of_form, meant_by_form
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled
+from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
 
-SYMMETRIC_FORM = 6
 COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
-MARK = 4  #: bytes of a record's length
+RECORD_MARK = 4  #: bytes of a record's length
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
 NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
 CUT = "it ends within a matrix. The file is cut short."
 DAMAGED = "The file is damaged."
-LONGEST_LINE = 1024  #: characters
 
 
 @dataclass(slots=True)
@@ -61,7 +65,7 @@ class _Matrix:
         self.rows.append(row)
         self.counts.append(count)
 
-    def finished(self, numbers: npt.NDArray[Any], words: str) -> RawMatrix:
+    def finished(self, numbers: npt.NDArray[Any], words: str, rounding: float) -> RawMatrix:
         """Put the numbers to their places."""
         columns, rows, counts = (np.array(part, dtype=np.int64) for part in (self.columns, self.rows, self.counts))
         outside = (
@@ -78,15 +82,19 @@ class _Matrix:
             msg = f"{self.name} has entries that are not finite. {DAMAGED}"
             raise FileFormatError(msg, path="")
         values = numbers[0::2] + 1j * numbers[1::2] if self.per_value > 1 else numbers
-        declared: Declared = "symmetric" if self.form == SYMMETRIC_FORM else "unsaid"
+        places = (runs(rows - 1, counts), np.repeat(columns - 1, counts))
+        i, j, values, shape = meant_by_form(self.form, self.shape, self.name, (*places, values))
         return assembled(
-            runs(rows - 1, counts),
-            np.repeat(columns - 1, counts),
+            i,
+            j,
             values,
-            self.shape,
-            declared=declared if self.shape[0] == self.shape[1] else "unsaid",
+            shape,
+            declared=declared_by_form(self.form) if shape[0] == shape[1] else "unsaid",
             format=f"Nastran OUTPUT4 {words}, form {self.form}",
             title=self.name,
+            named=True,
+            doubts=doubts_of_form(self.form),
+            known_to=rounding,
         )
 
 
@@ -110,8 +118,15 @@ def is_text_output4(content: bytes) -> bool:
     return re.match(rb"^[ \d]{7}\d[ \d-]{7}\d {6,7}\d {6,7}[1-4][A-Za-z]", content[:80]) is not None
 
 
-def read_output4(content: bytes) -> list[RawMatrix]:
+def read_output4(content: bytes, room: int = MOST_ROWS) -> list[RawMatrix]:
     """Read all matrices of a file.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+    room : int
+        A header with more rows or columns is taken for damage.
 
     Raises
     ------
@@ -120,16 +135,16 @@ def read_output4(content: bytes) -> list[RawMatrix]:
         finite, no matrix at all.
     """
     order = _byte_order(content)
-    found = list(_text_matrices(Lines(content)) if order is None else _binary_matrices(content, order))
+    found = list(_text_matrices(Lines(content), room) if order is None else _binary_matrices(content, order, room))
     if not found:
         msg = "no matrix in it. Write it by OUTPUT4 or EXTSEOUT(ASMBULK,EXTBULK,DMIGOP2 or MATOP4)."
         raise FileFormatError(msg, path="")
     return found
 
 
-def _opened(numbers: tuple[int, ...], name: str, length: int) -> _Matrix:
+def _opened(numbers: tuple[int, ...], name: str, room: int) -> _Matrix:
     columns, rows, form, kind = numbers
-    sound = 0 < columns <= max(MOST_ROWS, length) and 0 < abs(rows) <= max(MOST_ROWS, length) and kind in TYPES
+    sound = 0 < columns <= room and 0 < abs(rows) <= room and kind in TYPES
     if not sound:
         msg = f"a header with {columns} columns, {rows} rows and type {kind}. {DAMAGED}"
         raise FileFormatError(msg, path="")
@@ -138,12 +153,12 @@ def _opened(numbers: tuple[int, ...], name: str, length: int) -> _Matrix:
 
 def _byte_order(content: bytes) -> str | None:
     for order in "<>":
-        if int(np.frombuffer(content[:MARK].ljust(MARK, b"\0"), order + "u4")[0]) in HEADER_BYTES:
+        if int(np.frombuffer(content[:RECORD_MARK].ljust(RECORD_MARK, b"\0"), order + "u4")[0]) in HEADER_BYTES:
             return order
     return None
 
 
-def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
+def _binary_matrices(content: bytes, order: str, room: int) -> Iterator[RawMatrix]:
     records = _records(content, order)
     for start, stop in records:
         word = HEADER_BYTES.get(stop - start)
@@ -151,8 +166,8 @@ def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
             msg = f"a record of {stop - start} bytes where a header should be. {DAMAGED}"
             raise FileFormatError(msg, path="")
         integer = np.dtype(f"{order}i{word}")
-        name = printable(content[start + 4 * word : stop])
-        matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, len(content))
+        name = printable(_joined_name(content[start + 4 * word : stop], word))
+        matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, room)
         real = np.dtype(f"{order}f8" if matrix.type in DOUBLE_TYPES else f"{order}f{word}")
         places: list[int] = []
         for begin, end in records:
@@ -174,23 +189,36 @@ def _binary_matrices(content: bytes, order: str) -> Iterator[RawMatrix]:
                 _sparse_column(matrix, places, (column, numbers), (data, word, real.itemsize))
         else:
             raise FileFormatError(CUT, path="")
-        yield matrix.finished(_gathered(content, matrix, places, real), "binary")
+        rounding = SINGLE_ROUNDING if real.itemsize == RECORD_MARK else EPS
+        yield matrix.finished(_gathered(content, matrix, places, real), "binary", rounding)
+
+
+def _joined_name(field: bytes, word: int) -> bytes:
+    """Return a name without the blanks that fill words of 8 bytes, where each holds four characters.
+
+    >>> _joined_name(b"LAMB    DA      ", 8), _joined_name(b"LAMBDA  ", 4)
+    (b'LAMBDA  ', b'LAMBDA  ')
+    """
+    halves = [field[place : place + word] for place in range(0, len(field), word)]
+    if word == RECORD_MARK or any(half[RECORD_MARK:].strip(b" \0") for half in halves):
+        return field
+    return b"".join([half[:RECORD_MARK] for half in halves])
 
 
 def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
-    """Give where records begin and end, each of which stands between two equal counts of its bytes."""
+    """Return where records begin and end, each of which stands between two equal counts of its bytes."""
     mark = struct.Struct(f"{order}I")
     place = 0
     while place < len(content):
-        stop = place + MARK + mark.unpack(content[place : place + MARK].ljust(MARK, b"\0"))[0]
-        closing = content[stop : stop + MARK]
-        if len(closing) < MARK:
+        stop = place + RECORD_MARK + mark.unpack(content[place : place + RECORD_MARK].ljust(RECORD_MARK, b"\0"))[0]
+        closing = content[stop : stop + RECORD_MARK]
+        if len(closing) < RECORD_MARK:
             raise FileFormatError(CUT, path="")
-        if closing != content[place : place + MARK] or (stop - place) % MARK:
+        if closing != content[place : place + RECORD_MARK] or (stop - place) % RECORD_MARK:
             msg = f"the record at byte {place} does not end as it begins. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        yield place + MARK, stop
-        place = stop + MARK
+        yield place + RECORD_MARK, stop
+        place = stop + RECORD_MARK
 
 
 def _sparse_column(
@@ -228,17 +256,18 @@ def _note(matrix: _Matrix, places: list[int], where: tuple[int, int, int], sizes
 
 def _gathered(content: bytes, matrix: _Matrix, places: list[int], real: np.dtype[Any]) -> npt.NDArray[np.float64]:
     """Take the values of all strings out of the file at once; records lie on multiples of four bytes."""
-    quarters = np.frombuffer(content, "u4", len(content) // MARK)
-    per_value = real.itemsize * matrix.per_value // MARK
+    quarters = np.frombuffer(content, "u4", len(content) // RECORD_MARK)
+    per_value = real.itemsize * matrix.per_value // RECORD_MARK
     lengths = np.array(matrix.counts, dtype=np.int64) * per_value
-    chosen = quarters[runs(np.array(places, dtype=np.int64) // MARK, lengths)]
+    chosen = quarters[runs(np.array(places, dtype=np.int64) // RECORD_MARK, lengths)]
     return chosen.view(real).astype(np.float64)
 
 
-def _text_matrices(lines: Lines) -> Iterator[RawMatrix]:
+def _text_matrices(lines: Lines, room: int) -> Iterator[RawMatrix]:
     number = 0
+    rounding = known_to(lines.content)
     while number < len(lines) and lines[number].strip():
-        matrix, per_line, width = _text_header(lines[number].decode("latin-1").rstrip(), len(lines.content), number)
+        matrix, per_line, width = _text_header(lines[number].decode("latin-1").rstrip(), room, number)
         number += 1
         parts: list[bytes] = []
         counts: list[int] = []
@@ -255,10 +284,13 @@ def _text_matrices(lines: Lines) -> Iterator[RawMatrix]:
         except ValueError as cause:
             msg = f"{matrix.name} has entries that are no numbers. {DAMAGED}"
             raise FileFormatError(msg, path="") from cause
-        yield matrix.finished(numbers, "text")
+        yield matrix.finished(numbers, "text", rounding)
+    if any(lines[later].strip() for later in range(number, len(lines))):
+        msg = f"an empty line stands between its matrices. {DAMAGED}"
+        raise FileFormatError(msg, path="", line=number + 1)
 
 
-def _text_header(line: str, length: int, number: int) -> tuple[_Matrix, int, int]:
+def _text_header(line: str, room: int, number: int) -> tuple[_Matrix, int, int]:
     wide = line.endswith("|I16")
     stops = (16, 32, 40, 48, 56) if wide else (8, 16, 24, 32, 40)
     cuts = [line[start:stop] for start, stop in zip((0, *stops), stops, strict=False)]
@@ -272,7 +304,7 @@ def _text_header(line: str, length: int, number: int) -> tuple[_Matrix, int, int
     if not 0 < per_line * width <= LONGEST_LINE:
         msg = f"the number format {line[stops[-1] :].strip()!r} is none of OUTPUT4. {DAMAGED}"
         raise FileFormatError(msg, path="", line=number + 1)
-    return _opened(numbers, printable(cuts[4].encode("latin-1")), length), per_line, width
+    return _opened(numbers, printable(cuts[4].encode("latin-1")), room), per_line, width
 
 
 def _integers(lines: Lines, number: int, count: int) -> list[int]:

@@ -12,16 +12,17 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import FileFormatError
 
-Declared: TypeAlias = Literal["symmetric", "skew-symmetric", "general", "unsaid"]
+Declared: TypeAlias = Literal["symmetric", "skew-symmetric", "general", "unsymmetric", "unsaid"]
 Storage: TypeAlias = Literal["diagonal", "lower", "upper", "either", "both"]
 Triangle: TypeAlias = Literal["lower", "upper"]
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 
 MOST_ROWS = 20_000_000  #: index arrays of 160 MB; a header that says more than this and the file's length is damaged
+FREE_ROWS = 10_000  #: rows that a file may say it has, whatever its length
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
-MATRIX_DIMENSIONS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -36,13 +37,18 @@ class RawMatrix:
     title: str = ""  #: what the file calls it
     letter: str | None = None  #: M, C, K or S (structural damping), if the file tells
     dofs: tuple[str, ...] | None = None  #: names of its rows, if the file has labels
+    named: bool = False  #: whether `title` is its name among those of the file
+    dense: npt.NDArray[Any] | None = None  #: the same numbers, if the file holds all n x m of them
+    open_size: bool = False  #: whether there may be more rows, without entries, than the file tells
+    first_index: int = 1  #: from which number on the file counts rows, where it does not say so
+    known_to: float = EPS  #: relative rounding of the entries by the file's digits
     notes: tuple[str, ...] = ()  #: anything else that a user should know
     doubts: tuple[str, ...] = ()  #: what may be wrong with the file
 
     @property
     def is_half_stored(self) -> bool:
         """Whether all off-diagonal entries lack their partner, and nobody said that this means symmetric."""
-        one_sided = self.stored in {"lower", "upper", "either"}
+        one_sided = self.stored in {"lower", "upper", "either"} and self.declared != "unsymmetric"
         return one_sided and not self.completed and self.matrix.shape[0] == self.matrix.shape[1]
 
 
@@ -63,7 +69,7 @@ def assembled(
         From zero on.
     values : (k,) ndarray
     shape : (int, int)
-    declared : {"symmetric", "skew-symmetric", "general", "unsaid"}
+    declared : {"symmetric", "skew-symmetric", "general", "unsymmetric", "unsaid"}
         The first two let the other entry of each pair be filled in.
 
     Raises
@@ -79,6 +85,12 @@ def assembled(
     >>> assembled(*half, declared="unsaid", format="example").is_half_stored
     True
     """
+    if rows.size and min(rows.min(), columns.min()) == -1:
+        msg = (
+            f"an entry lies outside the {shape[0]} x {shape[1]} matrix, in row or column 0: it counts rows from 0, but "
+            "this format counts from 1. Add 1 to all row and column numbers."
+        )
+        raise FileFormatError(msg, path="")
     if rows.size and (min(rows.min(), columns.min()) < 0 or rows.max() >= shape[0] or columns.max() >= shape[1]):
         msg = f"an entry lies outside the {shape[0]} x {shape[1]} matrix. The file is damaged."
         raise FileFormatError(msg, path="")
@@ -93,8 +105,13 @@ def assembled(
     return completed(raw) if declared in {"symmetric", "skew-symmetric"} and raw.stored != "diagonal" else raw
 
 
+def most_rows(length: int) -> int:
+    """Return how many rows files of so many bytes may have: a row without a byte carries no entry in any matrix."""
+    return min(MOST_ROWS, max(FREE_ROWS, length))
+
+
 def storage(matrix: csc_array) -> Storage:
-    """Tell where the off-diagonal entries of a matrix are.
+    """Return where the off-diagonal entries of a matrix are.
 
     "either" means in both triangles, but never both entries of a pair.
     """

@@ -7,7 +7,6 @@ Fortran writes them, are cut out of padded lines, so that numbers without a blan
 
 import io
 import re
-import warnings
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -15,13 +14,18 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 
-BLOCK = 2**25  #: bytes that are parsed at once
+BOM = b"\xef\xbb\xbf"  #: begins text that Windows wrote as UTF-8
+LONGEST_LINE = 1024  #: characters of a line of fixed fields; Fortran's own limit is 132
+TEXT_BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
 NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
 TAIL = 4096  #: bytes at the end of a text that are looked at
 FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
 WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
 TOO_LONG = "a line has more than its fields"
+TOO_SHORT = "lines are far shorter than their fields"
+MOST_GROWTH = 10  #: times that lines may grow when blanks at their ends are filled in,
+FREE_SPREAD = 2**20  #: beyond so many bytes
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
 
@@ -58,10 +62,10 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
     for block, line in _blocks(content, first_line):
         text = block.translate(AS_PYTHON)
         marked = comment.encode() in text
+        if not _has_rows(text, comment):  # loadtxt would warn, and a filter is the whole process's
+            continue
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # of a block of comments
-                table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
+            table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
         except ValueError as cause:
             raise _bad_row(text, columns, comment, line) from cause
         if table.size and (table.shape[1] != columns or not np.isfinite(table).all()):
@@ -71,7 +75,7 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
 
 
 def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:
-    """Give parsed numbers as integers, and refuse fractions.
+    """Return parsed numbers as integers, and refuse fractions.
 
     Raises
     ------
@@ -87,7 +91,7 @@ def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], 
 
 
 def printable(text: bytes) -> str:
-    r"""Give a name or title of a file for people to read, whatever damage did to it.
+    r"""Return a name or title of a file for people to read, whatever damage did to it.
 
     >>> printable(b"KAAX \x00\n")
     'KAAX'
@@ -99,7 +103,7 @@ def printable(text: bytes) -> str:
 
 
 def is_cut_short(content: bytes) -> bool:
-    r"""Tell whether the last number of a text without a last line end has lost digits for sure.
+    r"""Return whether the last number of a text without a last line end has lost digits for sure.
 
     So it is where the numbers that end the lines before it all have one length and it has less.
 
@@ -143,6 +147,8 @@ def fixed_width(lines: Sequence[bytes], width: int, per_line: int, counts: Seque
     full = width * per_line
     if any(len(line) > full and line[full:].strip() for line in lines):
         raise ValueError(TOO_LONG)
+    if full * len(lines) > FREE_SPREAD + MOST_GROWTH * sum(map(len, lines)):
+        raise ValueError(TOO_SHORT)
     text = b"".join([line[:full].ljust(full) for line in lines]).translate(AS_PYTHON)
     fields = np.frombuffer(text, dtype=f"S{width}").reshape(len(lines), per_line)
     return _parsed(fields[np.arange(per_line) < np.asarray(counts)[:, None]])
@@ -162,7 +168,7 @@ class Lines:
         return int(self.ends.size)
 
     def __getitem__(self, number: int) -> bytes:
-        """Give a line, counted from zero, without its end."""
+        """Return a line, counted from zero, without its end."""
         return self.content[self._start(number) : int(self.ends[number])].rstrip(b"\r")
 
     def _start(self, number: int) -> int:
@@ -208,12 +214,16 @@ def _blocks(content: bytes, first_line: int) -> Iterator[tuple[bytes, int]]:
     """Cut the content at line ends, with the number of each block's first line."""
     start, line = 0, first_line
     while start < len(content):
-        stop = content.find(b"\n", min(start + BLOCK, len(content)))
+        stop = content.find(b"\n", min(start + TEXT_BLOCK, len(content)))
         stop = len(content) if stop < 0 else stop + 1
         block = content[start:stop]
         yield block, line
         line += block.count(b"\n")
         start = stop
+
+
+def _has_rows(text: bytes, comment: str) -> bool:
+    return re.search(rb"^ *[^\s" + re.escape(comment.encode()) + rb"]", text, re.MULTILINE) is not None
 
 
 def _bad_row(text: bytes, columns: int, comment: str, first_line: int) -> FileFormatError:

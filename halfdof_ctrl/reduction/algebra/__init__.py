@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Scaling, factorizations and blocks of matrices; knows no model."""

@@ -17,7 +17,7 @@ IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
 
 def as_integers(values: FloatArray) -> tuple[IntegerArray, int]:
-    """Give integers and the power of two that they have been multiplied by.
+    """Return integers and the power of two that they have been multiplied by.
 
     Examples
     --------
@@ -32,7 +32,7 @@ def as_integers(values: FloatArray) -> tuple[IntegerArray, int]:
 
 
 def as_floats(numerators: IntegerArray, denominator: int) -> FloatArray:
-    """Give the nearest floating-point numbers."""
+    """Return the nearest floating-point numbers."""
     values = [numerator / denominator for numerator in numerators.ravel().tolist()]
     return np.array(values, dtype=float).reshape(numerators.shape)
 
@@ -72,7 +72,7 @@ def solved_exactly(matrix: IntegerArray, right: IntegerArray) -> tuple[IntegerAr
 
 
 def log_determinant(matrix: IntegerArray) -> float:
-    """Give the natural logarithm of the size of a determinant of integers, -inf for a singular matrix.
+    """Return the natural logarithm of the size of a determinant of integers, -inf for a singular matrix.
 
     Examples
     --------

@@ -12,9 +12,7 @@ from halfdof_ctrl.reduction.algebra.scaling import evening_logs
 
 SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
 FEWEST = 256  #: n in that bound at least
-PLAINLY_REGULAR = (
-    1e-5  #: W with this reciprocal condition number as it stands is not scaled, nor its state space compared ...
-)
+PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number is not scaled, nor its state space compared ...
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
 SMALL = 60  #: DOFs that are few
 MOST_STEPS = 16  #: of the iteration for the best scaling
@@ -48,7 +46,7 @@ class LeadingMatrix:
         scaling after that if its condition still asks for it. So `rcond` is the same in any units up to what powers
         of two and the estimate leave, a factor of about four, or large enough in all of them.
         """
-        enough = PLAINLY_REGULAR_IF_SMALL if len(W) <= SMALL else PLAINLY_REGULAR
+        enough = plainly_regular(len(W))
         factors, pivots, rcond = _lu_and_rcond(W)
         if rcond >= enough:
             return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
@@ -66,7 +64,7 @@ class LeadingMatrix:
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
 
     def best_scaling(self) -> tuple[FloatArray, FloatArray]:
-        """Give powers of two near the row and column factors with which W has its least 1-norm condition number.
+        """Return powers of two near the row and column factors with which W has its least 1-norm condition number.
 
         The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
         any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
@@ -88,6 +86,11 @@ class LeadingMatrix:
         return self.rows * rows, self.columns * columns
 
     @property
+    def is_plainly_regular(self) -> bool:
+        """Whether the condition of W is so good that no digit worth a look is lost."""
+        return self.rcond >= plainly_regular(len(self.factors))
+
+    @property
     def is_singular(self) -> bool:
         """Whether W is singular to working precision: rcond below n eps, or 256 eps.
 
@@ -96,12 +99,12 @@ class LeadingMatrix:
         return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
 
     def singular_values(self) -> FloatArray:
-        """Give the singular values of the matrix that was factorized."""
+        """Return the singular values of the matrix that was factorized."""
         L, U = np.tril(self.factors, -1) + np.eye(len(self.factors)), np.triu(self.factors)
         return np.asarray(scipy.linalg.svdvals(L @ U))
 
     def elimination_size(self) -> FloatArray:
-        """Give ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
+        """Return ``|L| |U|`` in the rows and units of W: what rounding errors of the elimination are relative to."""
         L, U = np.tril(np.abs(self.factors), -1) + np.eye(len(self.factors)), np.triu(np.abs(self.factors))
         order = np.arange(len(self.factors))
         for i, j in enumerate(self.pivots.tolist()):
@@ -113,13 +116,18 @@ class LeadingMatrix:
         return size
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
+        """Return ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
         if self.rows is None or self.columns is None or self.equilibrated is None:
             return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
         right = right * self.rows[:, None]
         solution = dgetrs(self.factors, self.pivots, right)[0]
         solution += dgetrs(self.factors, self.pivots, right - self.equilibrated @ solution)[0]
         return np.asarray(solution * self.columns[:, None])
+
+
+def plainly_regular(size: int) -> float:
+    """Return the reciprocal condition number from which on W of so many DOFs needs no closer look."""
+    return PLAINLY_REGULAR_IF_SMALL if size <= SMALL else PLAINLY_REGULAR
 
 
 def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:

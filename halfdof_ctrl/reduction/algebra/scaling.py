@@ -26,7 +26,7 @@ SMALL = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
 
 
 def equilibrating_factors(matrix: FloatArray, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two r, c such that ``diag(r) matrix diag(c)`` has row and column maxima near one.
+    """Return powers of two r, c such that ``diag(r) matrix diag(c)`` has row and column maxima near one.
 
     Parameters
     ----------
@@ -60,18 +60,18 @@ def equilibrating_factors(matrix: FloatArray, even: float = EVEN) -> tuple[Float
 
 
 def _is_even(maxima: FloatArray, even: float) -> bool:
-    """Tell whether all nonzero maxima lie between 1 / even and even."""
+    """Return whether all nonzero maxima lie between 1 / even and even."""
     return all([1.0 / even <= value <= even or value == 0.0 for value in maxima.tolist()])  # noqa: C419  # faster
 
 
 def inverse_roots(maxima: FloatArray) -> FloatArray:
-    """Give the powers of two nearest to one over the square root, 1 for a zero."""
+    """Return the powers of two nearest to one over the square root, 1 for a zero."""
     exponents = np.frexp(maxima)[1]
     return np.asarray(np.ldexp(1.0, -((exponents + np.sign(exponents)) // 2)))
 
 
 def logarithmic_scaling(coefficients: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Give the logarithms of the row, column and time factors that bring all coefficients nearest to one.
+    """Return the logarithms of the row, column and time factors that bring all coefficients nearest to one.
 
     Least squares of ``log2 |P_k,ij| + r_i + c_j + k t`` over all nonzero coefficients (A. R. Curtis and J. K. Reid,
     On the automatic scaling of matrices for Gaussian elimination, 1972, with time as one more unknown). The scaled
@@ -102,7 +102,7 @@ def logarithmic_scaling(coefficients: FloatArray) -> tuple[FloatArray, FloatArra
 
 
 def evening_logs(matrix: Matrix | csc_array, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
-    """Give the logarithms of the row and column factors that bring all entries of one matrix nearest to one.
+    """Return the logarithms of the row and column factors that bring all entries of one matrix nearest to one.
 
     As `logarithmic_scaling` without time, and quicker for large matrices.
 
@@ -128,7 +128,7 @@ def evening_logs(matrix: Matrix | csc_array, settled: float = SETTLED) -> tuple[
 
 
 def unit_free_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give row and column factors that make all entries of a matrix even, and then the largest ones near one.
+    """Return row and column factors that make all entries of a matrix even, and then the largest ones near one.
 
     The scaled matrix is the same whatever the units were.
     """
@@ -138,7 +138,7 @@ def unit_free_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def time_log(coefficients: Sequence[Matrix | csc_array], settled: float = SETTLED) -> float:
-    """Give the logarithm of the time factor of `logarithmic_scaling`, for dense or sparse coefficients.
+    """Return the logarithm of the time factor of `logarithmic_scaling`, for dense or sparse coefficients.
 
     Examples
     --------
@@ -185,7 +185,7 @@ def _evening(
 
 
 def _entries(matrix: Matrix | csc_array) -> tuple[IndexArray, IndexArray, FloatArray]:
-    """Give the rows, columns and sizes of the nonzero entries."""
+    """Return the rows, columns and sizes of the nonzero entries."""
     entries = coo_array(matrix)
     present = np.flatnonzero(entries.data)
     i, j = entries.coords
@@ -193,7 +193,7 @@ def _entries(matrix: Matrix | csc_array) -> tuple[IndexArray, IndexArray, FloatA
 
 
 def levelling_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Give r, c such that the largest entries of the rows and columns of ``diag(r) matrix diag(c)`` are near one.
+    """Return r, c such that the largest entries of the rows and columns of ``diag(r) matrix diag(c)`` are near one.
 
     Like `equilibrating_factors`, but not rounded to powers of two: for decisions that must come out the same in any
     units, on a matrix that `logarithmic_scaling` has brought to the same values in any units.
@@ -207,12 +207,12 @@ def levelling_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def root_or_one(maxima: FloatArray) -> FloatArray:
-    """Give the square roots, 1 for a zero."""
+    """Return the square roots, 1 for a zero."""
     return np.sqrt(np.where(maxima > 0.0, maxima, 1.0))
 
 
 def gap_threshold(values: FloatArray, low: float, high: float) -> float:
-    """Give the middle of the widest gap between values from `low` to `high`; `low` itself if none lies there."""
+    """Return the middle of the widest gap between values from `low` to `high`; `low` itself if none lies there."""
     inside = np.sort(values[(values > low) & (values < high)])
     if inside.size == 0:
         return low

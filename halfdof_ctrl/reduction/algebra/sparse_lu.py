@@ -21,14 +21,10 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.sparse_products import exact_residual, times
+from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
-from halfdof_ctrl.base.sparse_arrays import (
-    SparseMatrix,
-    column_of_entries,
-    exact_residual,
-    largest_by_row_and_column,
-    times,
-)
 
 PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
 WIDTH = 8  #: right-hand sides worked at a time
@@ -39,6 +35,8 @@ SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal
 SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
 SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
+DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
+CHEAP = 200  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
@@ -61,13 +59,19 @@ class SparseLU:
         """Equilibrate, factorize and estimate the condition.
 
         Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
-        logarithms of its entries, which does not depend on units, and judged again.
+        logarithms of its entries, which does not depend on units, and judged again; a small one that looks ill
+        conditioned is scaled as the dense leading matrix is.
         """
         first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
+        if matrix.shape[0] <= CHEAP and first.rcond < DOUBTFUL:
+            best = LeadingMatrix.factorized(matrix.toarray())
+            if best.rows is not None and best.columns is not None:
+                return _better(first, cls._scaled(matrix, best.rows, best.columns))
         if not first.is_singular:
             return first
-        second = cls._scaled(matrix, *[np.exp2(np.round(logs)) for logs in evening_logs(matrix, settled=SETTLED)])
-        return second if second.rcond > first.rcond else first
+        return _better(
+            first, cls._scaled(matrix, *[np.exp2(np.round(log)) for log in evening_logs(matrix, settled=SETTLED)])
+        )
 
     @classmethod
     def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
@@ -83,13 +87,13 @@ class SparseLU:
         return self.rcond < min(self.rows.size * float(np.finfo(float).eps), SINGULAR)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
+        """Return ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
         solution = self._solved(right, "T")
         solution *= self.columns[:, None]
         return solution
 
     def solve_transposed(self, right: FloatArray) -> FloatArray:
-        """Give ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
+        """Return ``diag(rows)^-1 W^-T right`` for an (n, k) array, k small, which is overwritten.
 
         Where solutions are corrected, in extended precision: products in which terms cancel keep their digits.
         """
@@ -97,11 +101,11 @@ class SparseLU:
         return self._solved(right, "N")
 
     def column_sizes(self, solution: FloatArray) -> FloatArray:
-        """Give the largest entry of each column of what `solve` gave, in the units in which W is even."""
+        """Return the largest entry of each column of what `solve` gave, in the units in which W is even."""
         return largest_of_columns(solution / self.columns[:, None])
 
     def null_vector(self) -> FloatArray:
-        """Give a vector that the scaled matrix, if it is singular, makes zero, its largest entry one.
+        """Return a vector that the scaled matrix, if it is singular, makes zero, its largest entry one.
 
         By inverse iteration on the matrix with a diagonal of some 1e-12 added, which is singular in no case.
         """
@@ -124,13 +128,17 @@ class SparseLU:
         return np.asarray(solution + correction.astype(np.longdouble if transposed == "N" else float))
 
 
+def _better(one: SparseLU, other: SparseLU) -> SparseLU:
+    return other if other.rcond > one.rcond else one
+
+
 def largest_of_columns(matrix: FloatArray) -> FloatArray:
-    """Give the size of the largest entry of each column."""
+    """Return the size of the largest entry of each column."""
     return np.asarray(np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0)))
 
 
 def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
-    """Give powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
+    """Return powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
 
     Examples
     --------
@@ -154,7 +162,7 @@ def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tu
 
 
 def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
-    """Give factors as `scaling.levelling_factors` does, for a sparse matrix."""
+    """Return factors as `scaling.levelling_factors` does, for a sparse matrix."""
     size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
     column = column_of_entries(size)
     rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
@@ -168,13 +176,13 @@ def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArr
 
 
 def scaled_matrix(matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> SparseMatrix:
-    """Give ``diag(rows) matrix diag(columns)``."""
+    """Return ``diag(rows) matrix diag(columns)``."""
     data = matrix.data * rows[matrix.indices] * columns[column_of_entries(matrix)]
     return csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def is_nearly_symmetric(matrix: SparseMatrix) -> bool:
-    """Tell whether most entries have a partner across the diagonal."""
+    """Return whether most entries have a partner across the diagonal."""
     pattern = csc_array((np.ones(matrix.nnz, dtype=np.int8), matrix.indices, matrix.indptr), shape=matrix.shape)
     return bool(pattern.multiply(pattern.T).nnz >= SYMMETRIC_SHARE * pattern.nnz)
 
@@ -202,13 +210,21 @@ def _attempt(matrix: SparseMatrix, ordering: Any, threshold: float) -> Any:  # n
 
 
 def _reciprocal_condition(scaled: SparseMatrix, factors: Any) -> float:  # noqa: ANN401  # SuperLU has no public type
-    """Estimate the reciprocal 1-norm condition number (N. J. Higham and F. Tisseur, 2000)."""
+    """Estimate the reciprocal 1-norm condition number.
+
+    By the iteration of N. J. Higham and F. Tisseur (2000) with one column, and, as LAPACK does, by a vector of rising
+    size and alternating sign: what is nearly singular by cancellation may be invisible to the constant vector with
+    which the iteration begins.
+    """
+    n = scaled.shape[0]
     inverse = LinearOperator(
         scaled.shape,
         matvec=lambda vector: factors.solve(vector.ravel(), trans="T"),
         rmatvec=lambda vector: factors.solve(vector.ravel()),
         dtype=np.float64,
     )
+    alternating = (-1.0) ** np.arange(n) * (1.0 + np.arange(n) / max(n - 1, 1))
     with np.errstate(all="ignore"):
-        largest = float(abs(scaled).sum(axis=0).max()) * float(onenormest(inverse, t=1))
+        second = 2.0 * float(np.abs(factors.solve(alternating, trans="T")).sum()) / (3.0 * n)
+        largest = float(abs(scaled).sum(axis=0).max()) * max(float(onenormest(inverse, t=1)), second)
     return 1.0 / largest if np.isfinite(largest) and largest > 0.0 else 0.0

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""The method for any regular pencil."""

@@ -20,11 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.integers import IntegerArray, as_floats, as_integers, solved_exactly
-from halfdof_ctrl.reduction.deflation.offsets import IndexArray, Offsets
+from halfdof_ctrl.reduction.deflation.offsets import Offsets
 from halfdof_ctrl.reduction.deflation.row_system import (
-    EPS,
     Caution,
     Elimination,
     RowSystem,
@@ -192,13 +191,13 @@ def _bits(weight: int, power: int) -> int:
 
 
 def _are_short(values: FloatArray) -> bool:
-    """Tell whether numbers have so few bits that they can be meant to the last one: 3 and 0.625, but not 0.1."""
+    """Return whether numbers have so few bits that they can be meant to the last one: 3 and 0.625, but not 0.1."""
     fractions = np.ldexp(np.frexp(values)[0], SHORT)
     return bool((fractions == np.rint(fractions)).all())
 
 
 def _quotient(weight: int, divisor: int, power: int) -> float:
-    """Give ``weight 2^power / divisor``."""
+    """Return ``weight 2^power / divisor``."""
     return (weight << max(power, 0)) / (divisor << max(-power, 0))
 
 

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.deflation.realization import Realization, levels
-from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
+from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.integers import IntegerArray, as_floats, solved_exactly, without_common_factor
-from halfdof_ctrl.reduction.deflation.offsets import IndexArray
+from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
+from halfdof_ctrl.reduction.deflation.realization import Realization, levels
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations, trimmed
 
 LARGEST_EFFORT = 5e8  #: operations on bits, about a second
@@ -79,7 +78,7 @@ def solved_without_rounding(realization: Realization, system: ExactRows) -> Real
 
 
 def _derivatives(realization: Realization, system: ExactRows) -> _Fractions:
-    """Give q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u.
+    """Return q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u.
 
     Where the numbers given are not exact, what counts as zero in floating point does so here.
     """

@@ -1,32 +1,34 @@
-"""The whole road for any regular pencil: scale, relax, realize, certify.
+"""The method by deflation, for any regular pencil: scale, relax, realize, prove.
 
 Decisions at the edge of rounding can be wrong. A deflation is taken only if it passes equation (19); where it
 does not, or where a pencil is called singular whose P(s) is not, the decisions are taken again with more or less
 caution about rounding errors. If none passes, the model is refused.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil
-from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
-from halfdof_ctrl.base.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilError, UncertainRankError
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import derivative_name, listed
-from halfdof_ctrl.model.singular import causes, null_spaces
-from halfdof_ctrl.reduction.deflation.offsets import IndexArray, Offsets
-from halfdof_ctrl.reduction.dense.partition import RankDecision
-from halfdof_ctrl.model.refusals import singular_pencil_error
+from halfdof_ctrl.reduction.deflation.offsets import Offsets
+from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_units, realized, rounding_in_model_units
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
-from halfdof_ctrl.reduction.deflation.row_system import EPS, Caution, RowSystem, Units, scaled_rows
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations
-from halfdof_ctrl.base.spectrum import balanced
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
+from halfdof_ctrl.reduction.deflation.states import StateSelection
+from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import Loss
+from halfdof_ctrl.reduction.method.masses import without_light_masses
+from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil, scaled_pencil
+from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal, without_rounding
+from halfdof_ctrl.reduction.method.units import Units
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 AS_GIVEN = Caution(0.0, 0.0)  #: entries are what they are to the last digit
@@ -38,116 +40,98 @@ TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is 
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class StateSelection:
-    """The states of a deflated model: displacements, velocities and, rarely, higher derivatives of DOFs."""
+class Deflation:
+    """A reduction by deflation: a `ReductionMethod`."""
 
-    dofs: tuple[str, ...]  #: names of the n DOFs
-    places: tuple[tuple[int, int], ...]  #: (DOF, order of the derivative) of each state
-    differentiations: dict[str, int]  #: how often the equation of a DOF was differentiated, if at all
-    evidence: tuple[RankDecision, ...]  #: blocks of J, equation (16)
+    model: SecondOrderModel
+    coordinates: StateSelection
+    equations: StateEquations
+    rounding: Rounding
+    evidence: Evidence  #: `rcond` is the smallest of the square systems (18)
+    tol: float | None
 
     @property
-    def method(self) -> Literal["deflation"]:
-        """The road."""
+    def name(self) -> MethodName:
+        """`deflation`."""
         return "deflation"
 
     @property
-    def states(self) -> tuple[str, ...]:
-        """Names of the states."""
-        return tuple([derivative_name(self.dofs[j], order, self.dofs) for j, order in self.places])
+    def A(self) -> FloatArray:  # noqa: N802
+        """(N, N) state matrix."""
+        return self.equations.A
 
     @property
-    def inertial(self) -> tuple[str, ...]:
-        """DOFs with two states or more."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count > 1])
+    def B(self) -> FloatArray:  # noqa: N802
+        """(N, m) input matrix."""
+        return self.equations.B
 
     @property
-    def half(self) -> tuple[str, ...]:
-        """DOFs with one state."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 1])
+    def shift(self) -> tuple[FloatArray, ...]:
+        """E_0, E_1, ... of equation (5)."""
+        return self.equations.shift
 
     @property
-    def static(self) -> tuple[str, ...]:
-        """DOFs without a state: they follow from the others and the inputs."""
-        return tuple([dof for dof, count in zip(self.dofs, self._counts(), strict=True) if count == 0])
+    def input_derivatives(self) -> int:
+        """How many derivatives of the inputs the velocities may contain."""
+        return len(self.equations.displacement.U)
 
-    def kinds_of(self, dofs: tuple[str, ...]) -> dict[str, str]:
-        """Tell for each of the model's DOFs with less than two states whether it is half or static."""
-        return {dof: "half" if dof in self.half else "static" for dof in dofs if dof not in self.inertial}
+    def index(self) -> int:
+        """Return the index of the pencil (8) from the growth of its inverse.
 
-    def state_of(self, displacements: FloatArray, velocities: FloatArray) -> FloatArray:
-        """Give the states that belong to displacements and velocities of all n DOFs; higher derivatives are zero."""
-        from_q, from_v = self.state_maps()[:2]
-        return np.asarray(from_q @ displacements + from_v @ velocities)
+        With ``[1, s M]`` as forces and ``[1; s M]`` as outputs of P(s)^-1, less the identity that belongs to the mass,
+        the transfer function grows as the inverse of (8) does.
+        """
+        probe = _probe(self.model if self.tol is None else without_light_masses(self.model, self.tol))
+        result = deflated(probe, self.tol)
+        grown = output_signal(probe, result.equations, lambda: result.rounding)
+        return len(without_rounding(probe, grown, result.rounding).U)
 
-    def state_maps(self) -> tuple[FloatArray, ...]:
-        """Give L_q, L_v, ..., (N, n) each, of x = L_q q + L_v q' + ..."""
-        maps = np.zeros((max([order for _, order in self.places], default=0) + 2, len(self.places), len(self.dofs)))
-        for index, (j, order) in enumerate(self.places):
-            maps[order, index, j] = 1.0
-        return tuple(maps[: max(2, len(maps) - 1)])
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, lambda: self.rounding)
 
-    def _counts(self) -> list[int]:
-        return [int(count) for count in np.bincount([j for j, _ in self.places], minlength=len(self.dofs))]
+    def motion(self, derivative: int) -> Signal:
+        """Return a derivative of all DOFs."""
+        return self.equations.motion(derivative)
 
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return a derivative of all DOFs for given states and inputs."""
+        return self.equations.motion_at(x, inputs, derivative)
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Deflated:
-    """A model after deflation."""
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
 
-    selection: StateSelection
-    equations: StateEquations
-    rounding: Rounding
-    rcond: float  #: smallest reciprocal condition number of the square systems (18)
-    loss: float  #: what the state equations lose against a direct solve, relative to the largest entry
-    certified: bool  #: whether (19) holds, as it need not where `tol` was given
+    def decisions(self) -> tuple[RankDecision, ...]:
+        """Return the decisions about blocks of J, equation (16)."""
+        return self.evidence.decisions
 
+    def inverse_rows(self) -> FloatArray:
+        """Refuse: W is singular.
 
-def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
-    """Tell by equation (19) whether A, from whatever road, has the finite eigenvalues of a model, each as often."""
-    _, units, pencil = _scaled(model)
-    return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
-
-
-def loss(model: SecondOrderModel, equations: StateEquations) -> float:
-    """Measure what state equations, from whatever road, lose against direct solves."""
-    pencil, scaled = _in_scaled_units(model, equations)
-    return pencil.losses(scaled).worst
+        Raises
+        ------
+        SingularLeadingMatrixError
+        """
+        msg = "W of equation (2) is singular, so that alpha and gamma, the rows of its inverse, do not exist."
+        raise SingularLeadingMatrixError(msg, dofs=(), rcond=0.0)
 
 
-def expected_loss(model: SecondOrderModel, equations: StateEquations) -> float:
-    """Bound what state equations, from whatever road, lose by being rounded."""
-    pencil, scaled = _in_scaled_units(model, equations)
-    return pencil.expected_loss(scaled)
+def by_deflation(model: SecondOrderModel, tol: float | None) -> Deflation:
+    """Propose deflations and prove them.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+    UncertainRankError
+        No decision about ranks leads to state equations with the spectrum of P(s).
+    """
+    found = deflated(model if tol is None else without_light_masses(model, tol), tol)
+    return found if found.model is model else replace(found, model=model)
 
 
-def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
-    _, units, pencil = _scaled(model)
-    q, across = equations.displacement, units.inputs / units.columns[:, None]
-    scaled = StateEquations(
-        A=np.asarray(equations.A / units.time),
-        B=equations.B * units.inputs / units.time,
-        displacement=Signal(
-            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
-        ),
-        shift=(),
-    )
-    return pencil, scaled
-
-
-def _scaled(model: SecondOrderModel) -> tuple[RowSystem, Units, ScaledPencil]:
-    system, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
-    powers = np.arange(3)[:, None, None]
-    pencil = ScaledPencil(
-        P=system.matrix,
-        B=system.coefficients[:, :, system.size :],
-        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
-        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
-    )
-    return system, units, pencil
-
-
-def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
+def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflation:
     """Reduce any regular model.
 
     Parameters
@@ -165,30 +149,36 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflated:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    system, units, pencil = _scaled(model)
-    decisions: tuple[BlockDecision, ...] = ()
-    lossy: Deflated | None = None
-    exactly = tol is None and system.size <= LARGEST_EXACT
-    for rows, caution in _ways(system, exactly=exactly):
-        if lossy is not None and not isinstance(rows, ExactRows):
-            break
-        relaxation = relaxed(rows, caution, tol)
-        decisions = relaxation.decisions
+    best: Deflation | None = None
+    decisions: list[BlockDecision] = []
+    for found in _proposals(model, tol, decisions):
+        if found.evidence.loss.value <= ENOUGH or tol is not None:
+            return found
+        if best is None or found.evidence.loss.value < best.evidence.loss.value:
+            best = found
+    if best is None:
+        raise _uncertain_error(model, decisions, tol)
+    return best
+
+
+def _proposals(model: SecondOrderModel, tol: float | None, decisions: list[BlockDecision]) -> Iterator[Deflation]:
+    """Yield deflations that pass (19), or any where `tol` was given, with the decisions of the last one."""
+    rows, units, pencil = scaled_pencil(model)
+    system = RowSystem.scaled(rows)
+    found_before = False
+    for tried, caution in _ways(system, exactly=tol is None and system.size <= LARGEST_EXACT):
+        if found_before and not isinstance(tried, ExactRows):
+            return  # other cautions do not bring back digits
+        relaxation = relaxed(tried, caution, tol)
+        decisions[:] = relaxation.decisions
         if relaxation.offsets is None:
-            if lossy is None and pencil.is_singular():
+            if not found_before and pencil.is_singular():
                 raise _singular_error(model, pencil)
             continue
         result, certified = _realized(relaxation, relaxation.offsets, caution, pencil)
         if certified or tol is not None:
-            found = _in_model_units(model, relaxation, relaxation.offsets, result, units, pencil)
-            if lossy is not None:
-                return min(lossy, found, key=lambda item: item.loss)
-            if not exactly or isinstance(rows, ExactRows) or found.loss <= ENOUGH:
-                return replace(found, certified=certified)
-            lossy = found
-    if lossy is not None:
-        return lossy
-    raise _uncertain_error(model, decisions, tol)
+            yield _in_model_units(model, tol, relaxation, result, units, pencil, altered=not certified)
+            found_before = True
 
 
 def _realized(
@@ -203,7 +193,7 @@ def _realized(
 
 
 def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caution]]:
-    """Give the arithmetic and the caution to be tried in turn."""
+    """Return the arithmetic and the caution to be tried in turn."""
     rows = ExactRows.of(system) if exactly else None
     if rows is not None and not rows.exact:  # numbers like 0.1: what cancels leaves rounding in any arithmetic
         yield system, CAUTIONS[0]
@@ -216,32 +206,37 @@ def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caut
 
 def _in_model_units(
     model: SecondOrderModel,
+    tol: float | None,
     relaxation: Relaxed,
-    offsets: Offsets,
     result: Realization,
     units: Units,
     pencil: ScaledPencil,
-) -> Deflated:
+    *,
+    altered: bool,
+) -> Deflation:
     losses = pencil.losses(result.equations)
     known_to = np.maximum(losses.size, NOISE / ROUNDING * np.minimum(losses.error, TRUSTED * losses.size))
-    return Deflated(
-        selection=StateSelection(
+    counts = [] if relaxation.offsets is None else relaxation.offsets.equations.tolist()
+    return Deflation(
+        model=model,
+        coordinates=StateSelection(
             dofs=model.dofs,
             places=result.states,
-            differentiations={
-                model.dofs[i]: int(count) for i, count in enumerate(offsets.equations.tolist()) if count > 0
-            },
-            evidence=tuple([_evidence(model, decision) for decision in relaxation.decisions]),
+            differentiations={model.dofs[i]: int(count) for i, count in enumerate(counts) if count > 0},
         ),
         equations=in_model_units(result, units),
         rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
-        rcond=result.rcond,
-        loss=losses.worst,
-        certified=True,
+        evidence=Evidence(
+            decisions=tuple([_decision(model, decision) for decision in relaxation.decisions]),
+            rcond=result.rcond,
+            loss=Loss(losses.worst),
+            altered=altered,
+        ),
+        tol=tol,
     )
 
 
-def _evidence(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
+def _decision(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
     return RankDecision(
         matrix="J",
         dofs=_names(model, decision.unknowns),
@@ -266,9 +261,9 @@ def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPe
 
 
 def _uncertain_error(
-    model: SecondOrderModel, decisions: tuple[BlockDecision, ...], tol: float | None
+    model: SecondOrderModel, decisions: Sequence[BlockDecision], tol: float | None
 ) -> UncertainRankError:
-    closest = min((_evidence(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
+    closest = min((_decision(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
     rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
@@ -279,3 +274,24 @@ def _uncertain_error(
         f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)
+
+
+def _probe(model: SecondOrderModel) -> SecondOrderModel:
+    """Return the model whose transfer function grows as the inverse of the first-order pencil does."""
+    unit, zero = unit_matrix(len(model.M)), zero_matrix(*model.M.shape)
+    return replace(
+        model,
+        B=_beside(unit, zero),
+        Bv=_beside(zero, model.M),
+        Ba=_beside(zero, zero),
+        F=_beside(unit, zero).T,
+        G=_beside(zero, model.M.T).T,
+        H=_beside(zero, zero).T,
+        D=np.block([[zero, zero], [zero, -model.M]]),
+        Dv=np.zeros((2 * len(model.M), 2 * len(model.M))),
+        Da=np.zeros((2 * len(model.M), 2 * len(model.M))),
+    )
+
+
+def _beside(left: Matrix, right: Matrix) -> Matrix:
+    return read_only(np.hstack([left, right]))

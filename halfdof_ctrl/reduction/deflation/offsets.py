@@ -20,11 +20,9 @@ import scipy.optimize
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 
-IndexArray: TypeAlias = npt.NDArray[np.intp]
 BoolArray: TypeAlias = npt.NDArray[np.bool_]
-
 ABSENT = -(10**6)  #: degree of a zero entry: far below every difference of offsets
 
 
@@ -82,7 +80,7 @@ def structural_offsets(present: BoolArray) -> Offsets | None:
 
 
 def irreducible_blocks(pattern: BoolArray, matching: IndexArray) -> list[IndexArray]:
-    """Give the row sets of the diagonal blocks of the block triangular form (Dulmage and Mendelsohn)."""
+    """Return the row sets of the diagonal blocks of the block triangular form (Dulmage and Mendelsohn)."""
     count, label = connected_components(
         csr_array(pattern[:, matching].astype(np.int8)), directed=True, connection="strong"
     )

@@ -20,12 +20,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, read_only
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.deflation.offsets import BoolArray, IndexArray, Offsets
+from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
 from halfdof_ctrl.reduction.deflation.relaxation import independent_rows
-from halfdof_ctrl.reduction.deflation.row_system import EPS, Caution, RowSystem, Units, unit_free
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, unit_free
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
+from halfdof_ctrl.reduction.method.units import Units
 
 PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
 CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
@@ -61,7 +62,7 @@ class _Uncertain:
         self.square[place] += sizes @ right.square + (left.square + EPS**2 * sizes) @ right.value**2
 
     def at(self, *place: object) -> "_Uncertain":
-        """Give a part."""
+        """Return a part."""
         return _Uncertain(self.value[place], self.square[place])  # type: ignore[index]
 
 
@@ -121,7 +122,7 @@ def in_model_units(realization: Realization, units: Units) -> StateEquations:
 
 
 def rounding_in_model_units(realization: Realization, units: Units, columns: FloatArray, relative: float) -> Rounding:
-    """Give what the equations in the model's units are known to.
+    """Return what the equations in the model's units are known to.
 
     Parameters
     ----------
@@ -186,7 +187,7 @@ class Chain:
         return tuple([(j, order) for order, j in sorted(found)])
 
     def solved(self, states: tuple[tuple[int, int], ...], caution: Caution) -> tuple[_Uncertain, float]:
-        """Give q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u."""
+        """Return q^(0), q^(1), ... (orders, n, N + m L) as functions of the states and of L derivatives of u."""
         c, d = self.offsets.equations, self.offsets.unknowns
         n, N = self.system.size, len(states)
         width = N + (self.system.coefficients.shape[2] - n) * (len(self.system.coefficients) + int(c.max()))

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.deflation.offsets import IndexArray, Offsets, irreducible_blocks, structural_offsets
-from halfdof_ctrl.reduction.deflation.row_system import EPS, Caution, Elimination, RowSystem, levelled
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold
+from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks, structural_offsets
+from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, levelled
 
 RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
 PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
@@ -76,7 +76,7 @@ def relaxed(system: RowSystem, caution: Caution, tol: float | None = None) -> Re
 def _blocks(
     system: RowSystem, offsets: Offsets, caution: Caution, tol: float | None, known: "dict[bytes, _Block]"
 ) -> "list[_Block]":
-    """Give the irreducible blocks of J with more than one row, and add those that are new to the known ones."""
+    """Return the irreducible blocks of J with more than one row, and add those that are new to the known ones."""
     J = offsets.tight(system.matrix)
     found = []
     for rows in irreducible_blocks(J != 0.0, offsets.matching):

@@ -9,13 +9,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
-from halfdof_ctrl.reduction.deflation.offsets import BoolArray, IndexArray, Offsets
-from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors, logarithmic_scaling
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
+from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors
+from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
+from halfdof_ctrl.reduction.method.units import ScaledRows
 
-EPS = float(np.finfo(float).eps)
 DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
 
 
@@ -47,6 +46,17 @@ class RowSystem:
     row_logs: FloatArray  #: (n,) what rows still lack, as powers of two, to be the same in any units
     column_logs: FloatArray  #: (n,) the same for unknowns
     time_log: float  #: the same for each power of s
+
+    @classmethod
+    def scaled(cls, rows: ScaledRows) -> "RowSystem":
+        """Take entries as known to half a unit in the last place."""
+        return cls(
+            coefficients=rows.coefficients,
+            variance=(EPS * rows.coefficients) ** 2,
+            row_logs=rows.row_logs,
+            column_logs=rows.column_logs,
+            time_log=rows.time_log,
+        )
 
     @property
     def size(self) -> int:
@@ -85,30 +95,13 @@ class RowSystem:
         return replace(self, coefficients=values[:length], variance=squares[:length], row_logs=row_logs)
 
     def normalization(self, row: FloatArray) -> tuple[int, float]:
-        """Give the power of two that scales a row of P to about one, and what it then lacks to be so in any units."""
+        """Return the power of two that scales a row of P to about one, and what it then lacks to be so in any units."""
         speed = self.time_log * np.arange(len(row))[:, None]
         size = float((np.abs(row[:, : self.size]) * np.exp2(self.column_logs + speed)).max(initial=0.0))
         if size == 0.0:
             return 0, 0.0
         power = -round(math.log2(size))
         return power, -math.log2(size) - power
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Units:
-    """Powers of two between the model's units and those of a `RowSystem`.
-
-    ``q = diag(columns) q~, u = diag(inputs) u~, s = time s~``
-    """
-
-    columns: FloatArray  #: (n,)
-    inputs: FloatArray  #: (m,)
-    time: float
-
-    def by_time(self, values: FloatArray, power: npt.ArrayLike) -> FloatArray:
-        """Give ``values time^power`` for integer powers, also where the factor alone is beyond all floats."""
-        exponent = math.frexp(self.time)[1] - 1
-        return np.asarray(np.ldexp(values, np.asarray(power, dtype=np.intc) * exponent))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,26 +111,6 @@ class ScaledPart:
     matrix: FloatArray
     rows: FloatArray  #: factors of the rows
     columns: FloatArray
-
-
-def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[RowSystem, Units]:
-    """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
-    row_logs, column_logs, time_log = logarithmic_scaling(P)
-    row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
-    speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]
-    rows = np.exp2(row_powers)[:, None]
-    first = powers_of_two(np.abs(B).max(axis=(0, 1), initial=0.0))
-    driven = B * first * rows * speed
-    second = powers_of_two(np.abs(driven).max(axis=(0, 1), initial=0.0))
-    scaled = np.concatenate([P * np.exp2(column_powers) * rows * speed, driven * second], axis=2)
-    system = RowSystem(
-        coefficients=scaled,
-        variance=(EPS * scaled) ** 2,
-        row_logs=row_logs - row_powers,
-        column_logs=column_logs - column_powers,
-        time_log=float(time_log - time_power),
-    )
-    return system, Units(columns=np.exp2(column_powers), inputs=first * second, time=float(np.exp2(time_power)))
 
 
 def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
@@ -155,19 +128,19 @@ def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArra
 
 
 def shifts_of(offsets: Offsets, eliminations: list[Elimination]) -> list[IndexArray]:
-    """Give the powers ``c_i - c_h`` of s for the sources of each elimination."""
+    """Return the powers ``c_i - c_h`` of s for the sources of each elimination."""
     return [offsets.equations[item.sources] - offsets.equations[item.row] for item in eliminations]
 
 
 def tight_places(offsets: Offsets, item: Elimination, length: int) -> tuple[IndexArray, IndexArray]:
-    """Give the powers of s and the columns at which (17) makes a row of so many powers vanish."""
+    """Return the powers of s and the columns at which (17) makes a row of so many powers vanish."""
     power = offsets.unknowns[item.columns] - offsets.equations[item.row]
     inside = (power >= 0) & (power < length)
     return power[inside], item.columns[inside]
 
 
 def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolArray:
-    """Tell which entries are rounding errors: those below the widest gap in their ratio to the mean error.
+    """Return which entries are rounding errors: those below the widest gap in their ratio to the mean error.
 
     Mean errors tell little more than a power of ten, but what is meant is far above them.
     """

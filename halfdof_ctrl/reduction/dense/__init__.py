@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""The methods by one dense solve: a selection of DOFs, orthonormal bases."""

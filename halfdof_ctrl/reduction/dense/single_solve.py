@@ -9,10 +9,11 @@ others, sections 2.1 to 2.3.
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, is_zero, read_only, unit_matrix
-from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.dense.partition import DofPartition, connected_columns
+from halfdof_ctrl.reduction.algebra.blocks import connected_columns
+from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import logarithmic_scaling
+from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
 ROUNDING = 32 * np.finfo(float).eps  #: times n: what a solution of (3) is known to, of its largest scaled unknown

@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""What every method of the reduction gives and proves."""

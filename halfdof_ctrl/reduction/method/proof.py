@@ -15,10 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import balanced, balanced_states
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.integers import as_integers, log_determinant
 from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
-from halfdof_ctrl.reduction.method.signals import StateEquations
-from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
+from halfdof_ctrl.reduction.method.units import ScaledRows, Units, scaled_rows
 
 NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
 EPS = float(np.finfo(float).eps)
@@ -140,3 +142,49 @@ class ScaledPencil:
 def _at(coefficients: FloatArray, s: complex) -> ComplexArray:
     """Evaluate a matrix polynomial."""
     return np.asarray(np.tensordot(s ** np.arange(len(coefficients)), coefficients, axes=1))
+
+
+def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
+    """Tell by equation (19) whether A, by whatever method, has the finite eigenvalues of a model, each as often."""
+    _, units, pencil = scaled_pencil(model)
+    return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
+
+
+def loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Measure what state equations, by whatever method, lose against direct solves."""
+    pencil, scaled = _in_scaled_units(model, equations)
+    return pencil.losses(scaled).worst
+
+
+def expected_loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Bound what state equations, by whatever method, lose by being rounded."""
+    pencil, scaled = _in_scaled_units(model, equations)
+    return pencil.expected_loss(scaled)
+
+
+def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
+    _, units, pencil = scaled_pencil(model)
+    q, across = equations.displacement, units.inputs / units.columns[:, None]
+    scaled = StateEquations(
+        A=np.asarray(equations.A / units.time),
+        B=equations.B * units.inputs / units.time,
+        displacement=Signal(
+            q.X / units.columns[:, None], tuple([units.by_time(part * across, k) for k, part in enumerate(q.U)])
+        ),
+        shift=(),
+    )
+    return pencil, scaled
+
+
+def scaled_pencil(model: SecondOrderModel) -> tuple[ScaledRows, Units, ScaledPencil]:
+    """Return the rows of a model in scaled units, the units, and the pencil to be proved against."""
+    rows, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    n = len(model.dofs)
+    powers = np.arange(3)[:, None, None]
+    pencil = ScaledPencil(
+        P=rows.coefficients[:, :, :n],
+        B=rows.coefficients[:, :, n:],
+        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
+        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+    )
+    return rows, units, pencil

@@ -32,7 +32,7 @@ class RecoveredMotion:
     dofs: tuple[str, ...]  #: names of the n DOFs
 
     def __getitem__(self, name: str) -> FloatArray:
-        """Give the history of ``<dof>`` or ``<dof>_dot``.
+        """Return the history of ``<dof>`` or ``<dof>_dot``.
 
         Raises
         ------

@@ -6,12 +6,14 @@ w' = X A x + X B u + U_0 u' + U_1 u'' + ...                                     
 Derivatives of the inputs in the equation of the state are absorbed by another choice of it, equation (5).
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, is_zero
+from halfdof_ctrl.base.arrays import FloatArray, is_zero, unit_matrix
+from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +28,7 @@ class Signal:
         return Signal(self.X @ A, trimmed((self.X @ B, *self.U)))
 
     def combined(self, weights: FloatArray) -> "Signal":
-        """Give ``weights @ w``."""
+        """Return ``weights @ w``."""
         return Signal(weights @ self.X, trimmed(tuple([weights @ part for part in self.U])))
 
     def plus(self, other: "Signal") -> "Signal":
@@ -47,6 +49,24 @@ class StateEquations:
     B: FloatArray  #: (N, m)
     displacement: Signal  #: all n displacements, equation (4)
     shift: tuple[FloatArray, ...]  #: E_0, E_1, ... of equation (5), (N, m) each
+
+    def motion(self, derivative: int) -> Signal:
+        """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
+        signal = self.displacement
+        for _ in range(derivative):
+            signal = signal.derivative(self.A, self.B)
+        return signal
+
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return q or q' of all DOFs, (n, k), for states (N, k) and for the inputs and their derivatives, (m, k) each.
+
+        Derivatives that are missing at the end count as zero.
+        """
+        motion = self.motion(derivative)
+        history = np.tensordot(motion.X, x, axes=1)
+        for part, values in zip(motion.U, inputs, strict=False):
+            history += np.tensordot(part, values, axes=1)
+        return np.asarray(history)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -86,3 +106,51 @@ def absorbed(A: FloatArray, driven: list[FloatArray]) -> tuple[FloatArray, tuple
         shift = (carried, *shift)
         carried = lower + A @ carried
     return carried, shift
+
+
+def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: Callable[[], Rounding]) -> Signal:
+    """Return the outputs; of u', u'', ... only what is more than a rounding error.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    equations : StateEquations
+        Of the model.
+    rounding : callable
+        Gives the rounding errors of the equations; called where derivatives of the inputs show at all.
+    """
+    q = equations.displacement
+    output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
+    if not is_zero(model.G):
+        output = output.plus(q.combined(model.G).derivative(equations.A, equations.B))
+    if not is_zero(model.H):
+        velocity = q.combined(model.H).derivative(equations.A, equations.B)
+        output = output.plus(velocity.derivative(equations.A, equations.B))
+    direct = trimmed((model.D, model.Dv, model.Da))
+    if direct:
+        output = output.plus(Signal(np.zeros_like(output.X), direct))
+    if len(output.U) <= 1:
+        return output
+    kept = without_rounding(model, output, rounding()).U
+    return Signal(output.X, trimmed((output.U[0], *kept[1:])))
+
+
+def without_rounding(model: SecondOrderModel, output: Signal, rounding: Rounding) -> Signal:
+    """Drop coefficients of u, u', ... that are rounding errors of sums that cancel.
+
+    The bound evaluates (6) and (7) with the sizes that the rounding errors are relative to.
+    """
+    if not output.U:
+        return output
+    q = rounding.displacement
+    bound = q.combined(np.abs(model.F))
+    for order, matrix in ((1, model.G), (2, model.H)):
+        term = q.combined(np.abs(matrix))
+        for _ in range(order):
+            term = term.derivative(rounding.A, rounding.B)
+        bound = bound.plus(term)
+    kept = [
+        np.where(np.abs(part) <= rounding.relative * size, 0.0, part)
+        for part, size in zip_longest(output.U, bound.U[: len(output.U)], fillvalue=np.zeros_like(output.U[0]))
+    ]
+    return Signal(output.X, trimmed(tuple(kept)))

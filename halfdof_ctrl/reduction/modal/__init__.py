@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""Truncation to few modes: approximate, with a measured error."""

@@ -11,12 +11,13 @@ import scipy.linalg
 from scipy.sparse import csc_array, hstack
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.modal.damping import lumped_damping
 from halfdof_ctrl.base.errors import ModelSizeError, SingularPencilError
-from halfdof_ctrl.reduction.modal.modes import Modes, ShiftedStiffness, count_below, lowest_modes
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, times
+from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
+from halfdof_ctrl.reduction.modal.damping import lumped_damping
+from halfdof_ctrl.reduction.modal.modes import Modes, ShiftedStiffness, count_below, lowest_modes
 
 Parts = Mapping[str, SparseMatrix]  #: matrices of a model by their letters
 
@@ -123,7 +124,7 @@ def _modes(stiffness: ShiftedStiffness | None, f_max: float | None, n_modes: int
 
 
 def _following(parts: Parts, stiffness: ShiftedStiffness | None, kept: IndexArray, inner: IndexArray) -> FloatArray:
-    """Give the static motion of the others, (n - b, b), when one of the b kept DOFs moves."""
+    """Return the static motion of the others, (n - b, b), when one of the b kept DOFs moves."""
     if stiffness is None:
         return np.zeros((0, kept.size))
     coupling = csc_array(parts["K"] - stiffness.sigma * parts["M"])[:, kept]
@@ -133,7 +134,7 @@ def _following(parts: Parts, stiffness: ShiftedStiffness | None, kept: IndexArra
 
 
 def _loads(parts: Parts, follow: FloatArray, places: tuple[IndexArray, IndexArray], spread: SparseMatrix) -> FloatArray:
-    """Give the loads that static corrections are for: inertia of what follows, spread inputs and outputs."""
+    """Return the loads that static corrections are for: inertia of what follows, spread inputs and outputs."""
     kept, inner = places
     mass = csc_array(parts["M"].tocsr()[inner])
     inertia = mass[:, kept].toarray() + times(csc_array(mass[:, inner]), follow)
@@ -141,7 +142,7 @@ def _loads(parts: Parts, follow: FloatArray, places: tuple[IndexArray, IndexArra
 
 
 def _corrections(stiffness: ShiftedStiffness | None, modes: Modes, loads: FloatArray) -> FloatArray:
-    """Give the static motions under loads beyond the modes, orthonormal in energy, dependent ones left out."""
+    """Return the static motions under loads beyond the modes, orthonormal in energy, dependent ones left out."""
     loads = loads[:, loads.any(axis=0)]
     if stiffness is None or loads.shape[1] == 0:
         return np.zeros((loads.shape[0], 0))

@@ -12,7 +12,7 @@ ROUNDING = 1e-9  #: entries of C that differ from alpha M + beta K by this part 
 
 
 def lumped_damping(M: SparseMatrix, C: SparseMatrix, K: SparseMatrix) -> SparseMatrix:
-    """Give ``C - alpha M - beta K`` with rounding cleaned away, if that leaves far fewer entries than C.
+    """Return ``C - alpha M - beta K`` with rounding cleaned away, if that leaves far fewer entries than C.
 
     Any two places of the matrices say what alpha and beta are, if no damper is there; the medians over many pairs are
     not disturbed by dampers at a few places.

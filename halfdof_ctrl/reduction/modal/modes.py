@@ -12,16 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.progress import progress
-from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, times
+from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
+from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU
+from halfdof_ctrl.reduction.modal.slices import MOST, modes_by_slices
 
 FEW = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
-SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular
+SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular ...
+SOFTER = (1e-12, 1e-10, 1e-8, 1e-6, 1e-3)  #: ... or is not told from singular with that one either
 UNSYMMETRIC = 1e-9  #: relative difference between a matrix and its transpose that is no rounding
 MASSLESS = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
 
@@ -43,12 +45,17 @@ class ShiftedStiffness:
             return cls(K=K, M=M, sigma=0.0, factors=factors)
         stiffness, mass = np.abs(K.diagonal()), M.diagonal()
         speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
-        sigma = -SOFT * float(speeds[speeds > 0.0].min(initial=1.0))
-        factors = SparseLU.factorized(csc_array(K - sigma * M))
-        return None if factors.is_singular else cls(K=K, M=M, sigma=sigma, factors=factors)
+        speeds = speeds[speeds > 0.0]
+        slowest = float(speeds.min()) if speeds.size else 1.0
+        shifts = [-SOFT * min(slowest, 1.0), *[-part * slowest for part in SOFTER]]
+        for sigma in shifts:  # as little mass as makes it regular: much of it would hide the lowest modes from Lanczos
+            factors = SparseLU.factorized(csc_array(K - sigma * M))
+            if not factors.is_singular:
+                return cls(K=K, M=M, sigma=sigma, factors=factors)
+        return None
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Give ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
+        """Return ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
         solution = np.empty_like(right, order="F")
         for start in range(0, right.shape[1], WIDTH):
             span = slice(start, start + WIDTH)
@@ -57,7 +64,7 @@ class ShiftedStiffness:
         return solution
 
     def solve_sparse(self, right: SparseMatrix, what: str) -> FloatArray:
-        """Give ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
+        """Return ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
         solution = np.empty(right.shape, order="F")
         for start in progress(range(0, right.shape[1], WIDTH), what):
             span = slice(start, start + WIDTH)
@@ -74,7 +81,7 @@ class Modes:
 
 
 def is_unsymmetric(matrix: SparseMatrix) -> float:
-    """Give how far a matrix is from its transpose, relative to its largest entry; 0 where that is rounding."""
+    """Return how far a matrix is from its transpose, relative to its largest entry; 0 where that is rounding."""
     difference = csc_array(abs(matrix - matrix.T))
     largest = float(np.abs(matrix.data).max(initial=0.0))
     asymmetry = float(difference.data.max(initial=0.0)) / (largest or 1.0)
@@ -98,25 +105,23 @@ def lowest_modes(stiffness: ShiftedStiffness, count: int) -> Modes:
     Raises
     ------
     ParameterError
-        Lanczos does not converge, as where M or K are not semidefinite.
+        Neither one Lanczos iteration nor slices of the spectrum give them, as where M or K are not semidefinite.
     """
     massive = np.flatnonzero(np.diff(stiffness.M.indptr))
     if massive.size == 0 or count == 0:
         return Modes(np.zeros(0), np.zeros((stiffness.K.shape[0], 0)))
     if massive.size <= max(FEW, 3 * count):
         return _all_modes(stiffness, massive, count)
-    n, k = stiffness.K.shape[0], count
+    if count > MOST:
+        return _sorted(*modes_by_slices(stiffness.K, stiffness.M, count))
+    n = stiffness.K.shape[0]
     inverse = LinearOperator((n, n), matvec=lambda v: stiffness.solve(v.reshape(n, 1))[:, 0], dtype=np.float64)
     start = stiffness.solve(times(stiffness.M, np.random.default_rng(0).standard_normal((n, 1))))[:, 0]
     try:
-        squares, shapes = eigsh(stiffness.K, k=k, M=stiffness.M, sigma=stiffness.sigma, OPinv=inverse, v0=start)
-    except ArpackNoConvergence as cause:
-        msg = (
-            f"The Lanczos iteration found {len(cause.eigenvalues)} of {k} modes. Ask for fewer, and see that M and K "
-            "are positive semidefinite: a sign or unit that is wrong somewhere shows like this."
-        )
-        raise ParameterError(msg, parameter="n_modes", value=count) from cause
-    return _sorted(squares, shapes)
+        found = eigsh(stiffness.K, k=count, M=stiffness.M, sigma=stiffness.sigma, OPinv=inverse, v0=start)
+    except ArpackError:  # clustered modes, which one shift does not tell apart
+        found = modes_by_slices(stiffness.K, stiffness.M, count)
+    return _sorted(*found)
 
 
 def _all_modes(stiffness: ShiftedStiffness, massive: IndexArray, count: int) -> Modes:

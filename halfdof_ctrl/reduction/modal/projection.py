@@ -6,11 +6,14 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
-from halfdof_ctrl.model.second_order import SecondOrderModel, mechss
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES
-from halfdof_ctrl.base.sparse_arrays import SparseMatrix, times
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_products import times
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
 
+LOST = "K''"  #: the key of the imaginary part of a complex K among the matrices
 BLOCK = 32  #: motions that are multiplied at a time
 FAST = 1e-10  #: square of the band's upper end over a coordinate's own frequency up to which it needs no mass
 MASSLESS = 1e-13  #: of the scaled mass: combinations of coordinates below have none but rounding
@@ -19,7 +22,9 @@ SPECK = 1e-8  #: of the largest entry of a combination without mass, in scaled c
 FIRST = 1e3  #: weight by which kept DOFs are preferred as those that stay static
 
 
-def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: float) -> SecondOrderModel:
+def projected(
+    model: SecondOrderModel, parts: Parts, motions: Motions, omega: float
+) -> tuple[SecondOrderModel, FloatArray]:
     """Project a model on r motions, q = shapes p: a dense model of r DOFs.
 
     Parameters
@@ -34,9 +39,11 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
 
     Returns
     -------
-    SecondOrderModel
+    small : SecondOrderModel
         Kept DOFs have their names, modes are called ``mode1, ...``, corrections ``correction1, ...``; a kept DOF of
         which only a combination with others has mass is called ``<dof>~``.
+    basis : (n, r) ndarray
+        The motion that each of its DOFs is.
     """
     kept, count = motions.kept.size, motions.omega.size
     M, C, K = (_between(motions.shapes, parts[letter]) for letter in "MCK")
@@ -45,26 +52,29 @@ def projected(model: SecondOrderModel, parts: Parts, motions: Motions, omega: fl
     M[modal, modal], K[modal, modal] = np.eye(count), np.diag(motions.omega**2)
     signals: dict[str, Any] = {letter: np.asarray(parts[letter].T @ motions.shapes).T for letter in ("B", "Bv", "Ba")}
     signals |= {letter: times(parts[letter], motions.shapes) for letter in ("F", "G", "H")}
+    lost = _between(motions.shapes, parts[LOST]) if LOST in parts else None
     M, turn = _massless_columns(M, K, omega, kept)
     if turn is not None:
         C, K = _cleaned(turn.T, C, turn), _cleaned(turn.T, K, turn)
+        lost = None if lost is None else _cleaned(turn.T, lost, turn)
         signals |= {letter: turn.T @ signals[letter] for letter in ("B", "Bv", "Ba")}
         signals |= {letter: signals[letter] @ turn for letter in ("F", "G", "H")}
     signals |= {letter: parts[letter].toarray() for letter in ("D", "Dv", "Da")}
-    return mechss(
+    small = mechss(
         M,
         C,
-        K,
+        K if lost is None else K + 0.5j * (lost + lost.T),
         **signals,
         dofs=_names(model.dofs, motions, turn),
         name=model.name,
         inputs=model.inputs,
         outputs=model.outputs,
     )
+    return small, motions.shapes if turn is None else motions.shapes @ turn
 
 
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
-    """Give ``basis^T matrix basis``, some columns at a time."""
+    """Return ``basis^T matrix basis``, some columns at a time."""
     product = np.empty((basis.shape[1], basis.shape[1]))
     for start in range(0, basis.shape[1], BLOCK):
         span = slice(start, start + BLOCK)
@@ -73,7 +83,7 @@ def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
 
 
 def _massless_columns(M: FloatArray, K: FloatArray, omega: float, kept: int) -> tuple[FloatArray, FloatArray | None]:
-    """Give the mass with null columns for all that has none, and the change of coordinates p = turn p' that it takes.
+    """Return the mass with null columns for all that has none, and the change of coordinates p = turn p' that it takes.
 
     A coordinate whose own frequency lies far above the band needs no mass. Where combinations v of the others have none
     but rounding, as many coordinates are made these combinations, ``p' = p`` for them; the mass of the others stays.
@@ -120,7 +130,7 @@ def _names(dofs: tuple[str, ...], motions: Motions, turn: FloatArray | None) -> 
 
 
 def _free_names(taken: set[str], stem: str, count: int | None = None) -> tuple[str, ...]:
-    """Give a name that no DOF has, or several with numbers."""
+    """Return a name that no DOF has, or several with numbers."""
     while True:
         names = [stem] if count is None else [f"{stem}{k}" for k in range(1, count + 1)]
         if not any(name + end in taken for name in names for end in DERIVATIVE_SUFFIXES):

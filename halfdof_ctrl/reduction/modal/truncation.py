@@ -19,10 +19,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import scipy.linalg
+from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -30,20 +29,25 @@ from halfdof_ctrl.base.errors import (
     TruncationWarning,
     callers_level,
 )
-from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel, mechss
-from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.reduction.modal.projection import projected
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.mechss import mechss
+from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
+from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
+from halfdof_ctrl.reduction.modal.projection import LOST, projected
+from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resonance_errors
 
-POINTS = 12  #: frequencies at which the error is measured, besides resonances
-RESONANCES = 6  #: lowest resonances of the small model at which the error is measured
+POINTS = 12  #: frequencies between resonances at which the error is measured
 DOUBTFUL = 4  #: frequencies where most is expected of it, at which it is measured too
 CANDIDATES = 200  #: frequencies among which these are looked for
 EFFORT = 4e10  #: cubes of the small model's size that this may take
 DECADES = 2.0  #: of the band below its upper end
-ALLOWED = 0.05  #: error relative to a channel's largest value above which a warning is given
+ALLOWED = 0.05  #: error relative to a channel's largest value, or of a resonance's height, that is warned of
+ALLOWED_SHIFT = 0.01  #: relative shift of a resonance that is warned of
+BANDWIDTHS = 5.0  #: half-power bandwidths that frequencies between resonances keep from them
+SHARPEST = 5e-4  #: half-power bandwidth of an undamped resonance, in 2 pi of its frequency
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -59,17 +63,22 @@ class TruncatedModel(SecondOrderModel):
     mode_frequencies: FloatArray  #: (k,) of the modes that were kept, with these DOFs held [Hz]
     band: tuple[float, float]  #: lowest and highest frequency at which the error was measured [Hz]
     checked: FloatArray  #: (l,) frequencies at which it was measured [Hz]
-    errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value
-    #: between resonances, and at resonances to its largest of all
+    errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value there
+    resonances: ResonanceErrors  #: how far resonances in the band are from those of the full model
 
     @property
     def max_error(self) -> float:
-        """Largest of `errors`."""
+        """Largest of `errors`: between the resonances."""
         return float(self.errors.max(initial=0.0))
+
+    @property
+    def max_shift(self) -> float:
+        """Largest relative shift of the frequency of a resonance in the band that is more than rounding."""
+        found = self.resonances
+        return float(found.frequency_shift[found.frequency_shift > found.floor].max(initial=0.0))
 
     def __repr__(self) -> str:
         """Say what was kept of how much, and the error that was measured."""
-        i, j, k = np.unravel_index(int(self.errors.argmax()), self.errors.shape)
         corrections = len(self.dofs) - len(self.kept) - self.mode_frequencies.size
         modes = f"{self.mode_frequencies.size} modes"
         if self.mode_frequencies.size:
@@ -78,9 +87,7 @@ class TruncatedModel(SecondOrderModel):
             # two arguments, since a dataclass with slots is made anew and the bare super() knows the old one
             f"{super(TruncatedModel, self).__repr__()}\n"
             f"  of {self.full_size} DOFs: {len(self.kept)} kept, {modes} with these held, {corrections} corrections\n"
-            f"  error from {self.band[0]:.4g} to {self.band[1]:.4g} Hz, at {self.checked.size} frequencies: "
-            f"{self.max_error:.1e} of the channel's largest value\n"
-            f"  worst: {self.outputs[i]} from {self.inputs[j]} at {self.checked[k]:.4g} Hz"
+            f"{_error_in_words(self)}"
         )
 
 
@@ -93,16 +100,17 @@ def truncate_modes(
     Parameters
     ----------
     model : SecondOrderModel
-        Real, sparse or dense, with symmetric M and K that are positive semidefinite. Choose its inputs and outputs
-        before, with `select`: their DOFs are kept.
+        Sparse or dense, with symmetric M and K that are positive semidefinite. K may be complex (structural
+        damping): the modes are those of its real part, and the small model's K is complex too. Choose its inputs and
+        outputs before, with `select`: their DOFs are kept.
     f_max : float, optional
         Highest frequency that matters [Hz]. The modes up to twice this frequency are kept, found with the kept DOFs
         held.
     n_modes : int, optional
         Number of modes to keep, in the place of `f_max`; the band then reaches to half the highest of them.
     points : int
-        Frequencies at which the full model is factorized to measure the error; up to ten come on top: resonances,
-        and where most is expected of the error.
+        Frequencies between resonances at which the full model is factorized to measure the error; up to four where most
+        is expected of the error, and up to 40 resonances, come on top.
 
     Returns
     -------
@@ -114,7 +122,7 @@ def truncate_modes(
     ParameterError
         Not exactly one of `f_max` and `n_modes`, one that is not positive, or no convergence of the Lanczos iteration.
     ComplexModelError
-        The model has structural damping.
+        Another matrix than K has imaginary parts.
     MatrixError
         M or K is not symmetric.
     ModelSizeError
@@ -125,14 +133,16 @@ def truncate_modes(
     Warns
     -----
     TruncationWarning
-        The error is above 5 per cent of a channel's largest value.
+        The error is above 5 per cent of a channel's largest value between resonances or of a resonance's height, or a
+        resonance is shifted by more than 1 per cent.
 
     Notes
     -----
     DOFs are kept for every input and output that touches up to six of them, for dampers and for half DOFs. A damping
     ``alpha M + beta K`` needs none, nor does a damping that is spread over more than 1000 DOFs. Inputs and outputs that
-    touch more DOFs get a static correction each. The error is that of the whole transfer function, phase included;
-    near resonances without damping it is large for the smallest shift of a frequency.
+    touch more DOFs get a static correction each. Errors at resonances are shifts of frequency and damping and changes
+    of the height, one solve with the full model for each; at other frequencies the error is that of the whole transfer
+    function, phase included.
 
     Examples
     --------
@@ -149,10 +159,14 @@ def truncate_modes(
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     parts = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    if model.is_complex:  # modes are those of the real part; both are projected on them
+        parts |= {"K": csc_array(parts["K"].real), LOST: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
     top = _band_top(parts, motions.omega, f_max)
-    small = projected(model, parts, motions, 2.0 * np.pi * top)
-    return _measured(model, small, motions, top, points)
+    small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
+    band = (top / 10.0**DECADES, top)
+    resonances = resonance_errors(parts, small, basis, band)
+    return _measured(model, small, motions, resonances, (band, points))
 
 
 def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None:
@@ -171,12 +185,13 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
 
 
 def _require_symmetric(model: SecondOrderModel) -> None:
-    if model.is_complex:
+    others = tuple([letter for letter in model.complex_matrices if letter != "K"])
+    if others:
         msg = (
-            f"{listed(model.complex_matrices)} has imaginary parts (structural damping): its modes are not those of M "
-            "and K, and no real small model has them. descriptor_response computes such a model as it is."
+            f"{listed(others)} has imaginary parts, and a truncation keeps those of K alone (structural damping). "
+            "descriptor_response computes such a model as it is."
         )
-        raise ComplexModelError(msg, matrices=model.complex_matrices)
+        raise ComplexModelError(msg, matrices=others)
     for letter in "MK":
         asymmetry = is_unsymmetric(as_sparse(getattr(model, letter)))
         if asymmetry:
@@ -189,7 +204,7 @@ def _require_symmetric(model: SecondOrderModel) -> None:
 
 
 def _band_top(parts: Parts, omega: FloatArray, f_max: float | None) -> float:
-    """Give the highest frequency of the band [Hz]."""
+    """Return the highest frequency of the band [Hz]."""
     if f_max is not None:
         return f_max
     if omega.size and omega[-1] > 0.0:
@@ -203,21 +218,18 @@ def _measured(
     model: SecondOrderModel,
     small: SecondOrderModel,
     motions: Motions,
-    top: float,
-    points: int,
+    resonances: ResonanceErrors,
+    where: tuple[tuple[float, float], int],
 ) -> TruncatedModel:
-    """Compare with the full model over the band."""
-    low = top / 10.0**DECADES
-    peaks = _resonances(small, low, top)
-    smooth = np.union1d(np.geomspace(low, top, points), _doubtful(small, motions, low, top))
-    frequencies = np.union1d(smooth, peaks)
+    """Compare with the full model over the band, between the resonances."""
+    band, points = where
+    wanted = np.union1d(np.geomspace(*band, points), _doubtful(small, motions, *band))
+    frequencies = _beside(wanted, resonances.poles, band)
     s = 2j * np.pi * frequencies
     found, desired = small(s, squeeze=False), model(s, squeeze=False)
     sound = np.isfinite(found) & np.isfinite(desired)
     difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
     errors = _relative(difference, size)
-    elsewhere = np.isin(frequencies, smooth)  # or a sharp peak would make all errors beside it look small
-    errors[:, :, elsewhere] = _relative(difference[:, :, elsewhere], size[:, :, elsewhere])
     fields = {letter: getattr(small, letter) for letter in LETTERS}
     truncated = TruncatedModel(
         **fields,
@@ -229,15 +241,56 @@ def _measured(
         full_size=len(model.dofs),
         kept=tuple([model.dofs[place] for place in motions.kept.tolist()]),
         mode_frequencies=read_only(motions.omega / (2.0 * np.pi)),
-        band=(low, top),
+        band=band,
         checked=read_only(frequencies),
         errors=read_only(errors),
+        resonances=resonances,
     )
-    if truncated.max_error > ALLOWED:
-        said = repr(truncated).splitlines()
-        msg = f"The small model is not close to the full one:{said[-2]};{said[-1]}. Raise f_max or n_modes."
-        warnings.warn(" ".join(msg.split()), TruncationWarning, stacklevel=callers_level())
+    shift, height = truncated.max_shift, float(resonances.height.max(initial=0.0))
+    if truncated.max_error > ALLOWED or shift > ALLOWED_SHIFT or height > ALLOWED:
+        said = " ".join(_error_in_words(truncated).split())
+        msg = f"The small model is not close to the full one: {said}. Raise f_max or n_modes."
+        warnings.warn(msg, TruncationWarning, stacklevel=callers_level())
     return truncated
+
+
+def _beside(frequencies: FloatArray, poles: ComplexArray, band: tuple[float, float]) -> FloatArray:
+    """Move frequencies [Hz] off the resonances, by five half-power bandwidths."""
+    moved = frequencies.copy()
+    places, widths = (
+        np.abs(poles.imag) / (2.0 * np.pi),
+        np.maximum(np.abs(poles.real) / np.pi, SHARPEST * np.abs(poles)),
+    )
+    for k, frequency in enumerate(moved.tolist()):
+        free = frequency
+        for _ in range(places.size):
+            near = np.flatnonzero(np.abs(free - places) < BANDWIDTHS * widths)
+            if near.size == 0:
+                break
+            free = float((places + 1.01 * BANDWIDTHS * widths)[near].max())
+        moved[k] = free if free <= band[1] else frequency
+    return np.unique(moved)
+
+
+def _error_in_words(small: TruncatedModel) -> str:
+    """Say the errors at resonances and between them."""
+    i, j, k = np.unravel_index(int(small.errors.argmax()), small.errors.shape)
+    found, lines = small.resonances, ""
+    if found.frequencies.size:
+        worst = int(found.frequency_shift.argmax())
+        shift = f"{found.frequency_shift[worst]:.1e} (at {found.frequencies[worst]:.4g} Hz)"
+        if found.frequency_shift[worst] <= found.floor[worst]:
+            shift += ", not told from rounding"
+        lines = (
+            f"  {found.frequencies.size} resonances from {found.frequencies[0]:.4g} to {found.frequencies[-1]:.4g} Hz: "
+            f"frequency within {shift}, damping within {found.damping_shift.max():.1e}, height within "
+            f"{found.height.max():.1e}\n"
+        )
+    return (
+        f"{lines}  error between them from {small.band[0]:.4g} to {small.band[1]:.4g} Hz, at {small.checked.size} "
+        f"frequencies: {small.max_error:.1e} of the channel's largest value there\n"
+        f"  worst: {small.outputs[i]} from {small.inputs[j]} at {small.checked[k]:.4g} Hz"
+    )
 
 
 def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
@@ -248,7 +301,7 @@ def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
 
 
 def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
-    """Give frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
+    """Return frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
     count = min(CANDIDATES, int(EFFORT / len(small.dofs) ** 3))
     above = motions.kept.size + np.flatnonzero(motions.omega > 2.0 * np.pi * top)
     if count < DOUBTFUL or above.size == 0:
@@ -266,17 +319,3 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
     expected = _relative(difference, size).max(axis=(0, 1))
     peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
     return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL]]])
-
-
-def _resonances(small: SecondOrderModel, low: float, top: float) -> FloatArray:
-    """Give the lowest resonances in the band [Hz], of a model with damping."""
-    if not small.C.any():
-        return np.zeros(0)
-    size = np.diagonal(small.K) + (2.0 * np.pi * top) ** 2 * np.diagonal(small.M)
-    scale = np.sqrt(np.where(size > 0.0, size, 1.0))
-    K, M = (part / scale / scale[:, None] for part in (small.K, small.M))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        alpha, beta = scipy.linalg.eig(K, M, right=False, homogeneous_eigvals=True)
-        frequencies = np.sqrt(np.abs(alpha / beta)) / (2.0 * np.pi)
-    inside = np.unique(frequencies[(frequencies > low) & (frequencies < top)])
-    return np.asarray(inside[:RESONANCES])

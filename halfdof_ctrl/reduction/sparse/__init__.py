@@ -1,1 +1,1 @@
-"""Say in one line what this room is for."""
+"""The same methods for sparse models."""

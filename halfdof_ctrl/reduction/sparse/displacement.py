@@ -6,7 +6,7 @@ its row of (4); where the states and inputs are fewer than the combinations, the
 Histories of all DOFs take one solution a time.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -15,22 +15,14 @@ from scipy.sparse import csc_array, csr_array, hstack
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix
 from halfdof_ctrl.base.errors import ModelSizeError
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.base.progress import progress_bar
-from halfdof_ctrl.reduction.method.recovery import forward_slope
-from halfdof_ctrl.reduction.method.signals import Signal, absorbed, trimmed
-from halfdof_ctrl.base.sparse_arrays import (
-    IndexArray,
-    SparseMatrix,
-    Transposed,
-    as_sparse,
-    joined_sparse,
-    sparse_unit,
-    times,
-)
-from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU, largest_of_columns
-from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
+from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, as_sparse, joined_sparse, sparse_unit
+from halfdof_ctrl.base.sparse_products import Transposed, times
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU, largest_of_columns
+from halfdof_ctrl.reduction.method.signals import Signal, absorbed, trimmed
+from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
 
 MOST_ENTRIES = 2**26  #: of A, B, C or D of a state space, and of equation (4) for all DOFs, dense (512 MB)
 ROUNDING = 32 * float(np.finfo(float).eps)  #: times n, at most 64: a coefficient of u' below this part is rounding
@@ -121,7 +113,7 @@ class SparseDisplacement:
         return self.whole().U
 
     def whole(self) -> Signal:
-        """Give all displacements.
+        """Return all displacements.
 
         Raises
         ------
@@ -146,7 +138,7 @@ class SparseDisplacement:
 
     @limited_threads(1)
     def inverse_rows(self) -> FloatArray:
-        """Give the (n_i + n_c, n) rows of W^-1 for p''_i and p'_c, gamma and alpha.
+        """Return the (n_i + n_c, n) rows of W^-1 for p''_i and p'_c, gamma and alpha.
 
         Raises
         ------
@@ -162,11 +154,11 @@ class SparseDisplacement:
         return rows
 
     def combined(self, weights: Matrix) -> Signal:
-        """Give ``weights q`` for a (k, n) matrix, dense or sparse."""
+        """Return ``weights q`` for a (k, n) matrix, dense or sparse."""
         return self._combined(as_sparse(weights))[0]
 
     def output(self, model: SecondOrderModel) -> Signal:
-        """Give the outputs of a model with these displacements, without coefficients that are rounding errors.
+        """Return the outputs of a model with these displacements, without coefficients that are rounding errors.
 
         Raises
         ------
@@ -197,19 +189,9 @@ class SparseDisplacement:
         ]
         return Signal(total.X, trimmed((*total.U[:1], *kept)))
 
-    def histories(self, x: FloatArray, u: FloatArray, time: FloatArray) -> list[FloatArray]:
-        """Give displacements and velocities of all DOFs, (n, k) each, for states (N, k) and inputs (m, k) at k times.
-
-        Where a derivative of an input is needed, its slope until the next time is taken.
-        """
-        slopes = [u]
-        while len(slopes) < len(self.equation.forces) + 1:
-            slopes.append(forward_slope(slopes[-1], time))
-        return [self.motion_at(x, slopes, derivative) for derivative in range(2)]
-
     @limited_threads(1)
-    def motion_at(self, x: FloatArray, inputs: list[FloatArray], derivative: int) -> FloatArray:
-        """Give q or q' (derivative 0 or 1) of all DOFs, (n, k), for states and for the inputs and their derivatives."""
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return q or q' (derivative 0 or 1) of all DOFs, (n, k), for states, inputs and derivatives of inputs."""
         part, forces = self.equation.partition, self.equation.forces
         for _ in range(derivative):
             x, inputs = self.A @ x + self.B @ inputs[0], inputs[1:]
@@ -233,7 +215,7 @@ class SparseDisplacement:
 
     @limited_threads(1)
     def _combined(self, weights: SparseMatrix) -> tuple[Signal, Signal]:
-        """Give ``weights q``, and what the rounding errors of its coefficients are relative to."""
+        """Return ``weights q``, and what the rounding errors of its coefficients are relative to."""
         part, equation = self.equation.partition, self.equation
         given = part.mapped(weights)
         known = abs(given) if part.sizes is None else csc_array(abs(weights) @ part.sizes)
@@ -296,7 +278,7 @@ class SparseDisplacement:
         return products[0], products[1:], sizes[1:]
 
     def _input_sizes(self) -> tuple[FloatArray, list[FloatArray]]:
-        """Give what the rounding errors of B and of E_0, E_1 are relative to."""
+        """Return what the rounding errors of B and of E_0, E_1 are relative to."""
         part, (N, m) = self.equation.partition, self.B.shape
         n_i, moving = part.n_inertial, part.n_inertial + part.n_half
         rates = []
@@ -310,7 +292,7 @@ class SparseDisplacement:
 
 
 def _rows(signal: Signal, first: int, count: int) -> Signal:
-    """Give some rows of a signal."""
+    """Return some rows of a signal."""
     span = slice(first, first + count)
     return Signal(signal.X[span], trimmed(tuple([part[span] for part in signal.U])))
 

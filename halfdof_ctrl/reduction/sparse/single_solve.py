@@ -10,61 +10,22 @@ with n rows is kept but the factors. What the outputs need of the static coordin
 one a state and input where those are fewer. Derivation: docs/explanation/reduction.md.
 """
 
-from dataclasses import dataclass
-from typing import Literal
-
 import numpy as np
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import SingularLeadingMatrixError
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.progress import progress_bar
-from halfdof_ctrl.reduction.method.signals import absorbed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
-from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
-from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, largest_of_columns
-from halfdof_ctrl.reduction.sparse.partition import (
-    HALF,
-    INERTIAL,
-    STATIC,
-    SparsePartition,
-    has_dependent_columns,
-    select_sparse_columns,
-    sparse_bases,
-)
 from halfdof_ctrl.base.threads import limited_threads
-
-NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
-
-
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SparseReduction:
-    """What the reduction of a sparse model with N states and m inputs gives."""
-
-    partition: SparsePartition
-    leading: SparseLU  #: W of equation (2), factorized
-    A: FloatArray  #: (N, N)
-    B: FloatArray  #: (N, m)
-    displacement: SparseDisplacement  #: equation (4), worked out where it is asked for
-    shift: tuple[FloatArray, ...]  #: E_0, E_1 of equation (5)
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, largest_of_columns
+from halfdof_ctrl.reduction.method.signals import absorbed
+from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement, SparseEquation, inverse_rows, require_room
+from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
 
 
 @limited_threads(1)
-def sparse_reduction(
-    model: SecondOrderModel, tol: float | None, method: Literal["selection", "orthogonal"] | None
-) -> SparseReduction:
-    """Reduce a real sparse model to its exact states.
-
-    Raises
-    ------
-    ModelSizeError
-        A or B would be too large.
-    SingularLeadingMatrixError
-        W is singular to working precision, by both roads.
-    """
-    partition, leading = _partitioned(model, tol, method)
+def solved_by_rows(model: SecondOrderModel, partition: SparsePartition, leading: SparseLU) -> SparseDisplacement:
+    """Solve (3) row by row: A, B, and equation (4), which is worked out where it is asked for."""
     equation = SparseEquation.of(model, partition, leading.rows)
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     N = moving + n_i
@@ -81,32 +42,10 @@ def sparse_reduction(
             advance(block.size)
     A += 0.0  # leaves no negative zeros to be printed
     B, shift = absorbed(A, driven)
-    displacement = SparseDisplacement(equation, leading, A, B, shift, sizes)
-    return SparseReduction(partition=partition, leading=leading, A=A, B=B, displacement=displacement, shift=shift)
+    return SparseDisplacement(equation, leading, A, B, shift, sizes)
 
 
-def _partitioned(
-    model: SecondOrderModel, tol: float | None, method: Literal["selection", "orthogonal"] | None
-) -> tuple[SparsePartition, SparseLU]:
-    """Take the first road whose W is nonsingular."""
-    if method != "orthogonal":
-        partition = select_sparse_columns(model, tol)
-        _require_states(model, partition)
-        if method == "selection" or not has_dependent_columns(model, partition):
-            leading = SparseLU.factorized(_leading_columns(model, partition))
-            if not leading.is_singular:
-                return partition, leading
-            if method == "selection":
-                raise _singular_error(model, partition, leading)
-    partition = sparse_bases(model, tol)
-    _require_states(model, partition)
-    leading = SparseLU.factorized(_leading_columns(model, partition))
-    if leading.is_singular:
-        raise _singular_error(model, partition, leading)
-    return partition, leading
-
-
-def _require_states(model: SecondOrderModel, partition: SparsePartition) -> None:
+def require_states(model: SecondOrderModel, partition: SparsePartition) -> None:
     """Refuse an A or B that is too large."""
     n_i, n_c = partition.n_inertial, partition.n_half
     N, m = 2 * n_i + n_c, len(model.inputs)
@@ -120,7 +59,7 @@ def _require_states(model: SecondOrderModel, partition: SparsePartition) -> None
     require_room(N, m, "B", "Select the inputs that matter: model.select(inputs=[...]).")
 
 
-def _leading_columns(model: SecondOrderModel, partition: SparsePartition) -> SparseMatrix:
+def sparse_leading_columns(model: SecondOrderModel, partition: SparsePartition) -> SparseMatrix:
     """Assemble W, its columns in the order of the DOFs."""
     places = [partition.of_kind(kind) for kind in (INERTIAL, HALF, STATIC)]
     matrices = as_sparse(model.M), as_sparse(model.C), as_sparse(model.K)
@@ -135,22 +74,3 @@ def _leading_columns(model: SecondOrderModel, partition: SparsePartition) -> Spa
         into = np.repeat(starts[own] - part.indptr[:-1], np.diff(part.indptr)) + np.arange(part.nnz)
         data[into], rows[into] = part.data, part.indices
     return csc_array((data, rows, starts.astype(np.int32)), shape=matrices[0].shape)
-
-
-def _singular_error(
-    model: SecondOrderModel, partition: SparsePartition, leading: SparseLU
-) -> SingularLeadingMatrixError:
-    """Make the refusal of a singular W, naming the DOFs of its null vector."""
-    null = np.abs(leading.null_vector())
-    concerned = np.flatnonzero(null > NULL_VECTOR_SHARE * null.max())
-    if partition.columns is not None:
-        concerned = np.unique(partition.columns[:, concerned].indices)
-    dofs = tuple([model.dofs[index] for index in concerned.tolist()])
-    msg = (
-        f"The leading matrix W = [M T_i, C T_c, K T_k] is singular to working precision (rcond {leading.rcond:.1e}, "
-        f"by {partition.method}): the equations of motion do not determine the highest derivatives of DOFs "
-        f"{listed(dofs)}. Either a rigid constraint or an algebraic loop of dampers or springs ties them (index "
-        "above one), or nothing resists their motion. Give them the mass, damper or spring that the model left out, "
-        "or eliminate the constraint."
-    )
-    return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)

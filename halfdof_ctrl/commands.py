@@ -1,0 +1,377 @@
+"""What each subcommand of `halfdof-ctrl` does; `cli` has the parser and the exit codes."""
+
+import argparse
+import functools
+import inspect
+import math
+import os
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TypeAlias, TypedDict, overload
+
+import numpy as np
+
+from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, LostStateWarning, ParameterError
+from halfdof_ctrl.base.names import listed, motions
+from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.design.lqr import StateFeedback, lqr
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
+from halfdof_ctrl.files.folders import several_models
+from halfdof_ctrl.files.formats.raw_matrix import Triangle
+from halfdof_ctrl.files.models import inspect_files, load_model
+from halfdof_ctrl.files.systems import save_system
+from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
+from halfdof_ctrl.files.writing import replacing
+from halfdof_ctrl.model.law_text import element_from_text
+from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.nonlinear.response import nonlinear_response
+from halfdof_ctrl.parts.mounts import hydromount
+from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots.figure_files import save_figure
+from halfdof_ctrl.plots.step import MOST_RECOVERED
+from halfdof_ctrl.plots.stiffness import Scale
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.form import energy_system
+from halfdof_ctrl.report import check_as_json, default_design, write_report
+from halfdof_ctrl.systems.crosscheck import crosscheck
+from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
+from halfdof_ctrl.systems.frequency import (
+    DEFAULT_POINTS,
+    FEW_POINTS,
+    frequency_response,
+    has_many_states,
+    model_frequencies,
+)
+from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.step_times import relevant_poles, step_times
+from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.time_response import step_response
+from halfdof_ctrl.systems.working_states import working_system
+
+DONE, CHECK_FAILED, REFUSED = 0, 1, 2
+_Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
+BUILT_IN = {"hydromount": hydromount}
+BUILT_IN_SIGNALS: dict[str, _Signals] = {
+    "hydromount": (("F_y",), ("y", "y_dot"))
+}  #: what is shown unless the user asks for others
+BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
+LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
+FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
+FIGURE_ENDINGS = (".png", ".svg", ".pdf")
+WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    """Write the folder of a report."""
+    report = write_report(_model(arguments), arguments.o)
+    print(report.eigenvalues)
+    print(report.check)
+    for note in report.notes:
+        print(note)
+    print(f"report: {arguments.o}{os.sep}index.html")
+    return DONE if report.passed else CHECK_FAILED
+
+
+def run_info(arguments: argparse.Namespace) -> int:
+    """Print what a model is."""
+    if arguments.model not in BUILT_IN and (several := several_models(Path(arguments.model))):
+        print(several, flush=True)
+        return DONE
+    if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
+        print(inspect_files(arguments.model, **_file_options(arguments)), flush=True)
+    given = _given_model(arguments)
+    if isinstance(given, NonlinearModel):
+        print(given)
+        return DONE
+    model = given
+    print(model)
+    if len(model.dofs) > LARGEST_PENCIL:
+        if not model.is_sparse:
+            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+            return DONE
+        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
+        model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
+    else:
+        structure = pencil_structure(model)
+        kind = "regular" if structure.is_regular else "SINGULAR"
+        finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
+        print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
+        form = energy_system(model)
+        if form is not None and form.n_rigid:
+            zeros = int(np.count_nonzero(np.linalg.eigvals(form.A) == 0.0))
+            print(f"Free motions: {form.n_rigid}, {zeros} poles at exactly 0, so that some static response is infinite")
+    try:
+        print(exact_reduction(model))
+    except HalfdofError as refusal:
+        print(f"No state space: {refusal}")
+    return DONE
+
+
+def run_ss(arguments: argparse.Namespace) -> int:
+    """Write or print the state space."""
+    _require_ending(arguments.o, MATRIX_ENDINGS)
+    system = mech2ss(_model(arguments), states=arguments.states)
+    if arguments.o is None:
+        print(system)
+    else:
+        save_system(system, arguments.o)
+    return DONE
+
+
+def run_bode(arguments: argparse.Namespace) -> int:
+    """Draw or tabulate the frequency response."""
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    usual = FEW_POINTS if has_many_states(model) else DEFAULT_POINTS
+    omega = _frequencies(lambda: model_frequencies(model), arguments, usual=usual)
+    if kind in TABLE_ENDINGS:
+        save_response(frequency_response(model, omega), arguments.o)
+    else:
+        save_figure(bode_plot(model, omega, dB=arguments.db, Hz=arguments.hz, title=model.name), arguments.o)
+    return DONE
+
+
+def run_stiffness(arguments: argparse.Namespace) -> int:
+    """Draw the dynamic stiffness or the transmissibility."""
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    dof = _driven(model, arguments)
+    grid = functools.partial(motion_frequencies, [model], dof, free=True, linear=not arguments.log)
+    omega = _frequencies(grid, arguments, linear=not arguments.log)
+    if kind in TABLE_ENDINGS:
+        save_response(dynamic_stiffness_response(model, dof, grid() if omega is None else omega), arguments.o)
+    else:
+        scale: Scale = "log" if arguments.log else "linear"
+        save_figure(dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale), arguments.o)
+    return DONE
+
+
+def run_step(arguments: argparse.Namespace) -> int:
+    """Draw or tabulate the step response."""
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    given = _given_model(arguments)
+    if isinstance(given, NonlinearModel):
+        return _nonlinear_step(given, arguments, kind)
+    model = given
+    if kind in TABLE_ENDINGS:
+        save_response(step_response(_with_recovered(model), arguments.time), arguments.o)
+    else:
+        save_figure(step_plot(model, arguments.time, title=model.name), arguments.o)
+    return DONE
+
+
+def run_poles(arguments: argparse.Namespace) -> int:
+    """Print the eigenvalues of both forms, or draw them."""
+    _require_ending(arguments.o, FIGURE_ENDINGS)
+    model = _model(arguments)
+    table = eigenvalue_table(model, working_system(model))
+    if arguments.o is not None:
+        save_figure(pole_map_plot(model, title=model.name), arguments.o)
+    print(table)
+    return DONE
+
+
+def run_lqr(arguments: argparse.Namespace) -> int:
+    """Design a state feedback, print it or write it."""
+    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *GAIN_ENDINGS))
+    model = _model(arguments)
+    feedback, words = _feedback(model, arguments)
+    if kind in FIGURE_ENDINGS:
+        save_figure(pole_map_plot(model, feedback=feedback, title=model.name), arguments.o)
+    elif kind is not None:
+        save_gain(feedback, arguments.o)
+    if words:
+        print(words)
+    print(feedback)
+    return DONE
+
+
+def run_check(arguments: argparse.Namespace) -> int:
+    """Run the cross-check; exit code 1 where it fails."""
+    _require_ending(arguments.o, (".json",))
+    model = _model(arguments)
+    check = crosscheck(model, mech2ss(model))
+    if arguments.o is not None:
+        with replacing(arguments.o) as stream:
+            stream.write(check_as_json(check))
+    print(check)
+    return DONE if check.passed else CHECK_FAILED
+
+
+def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: str | None) -> int:
+    """Tabulate the response to a step of one input: there is no superposition of several."""
+    if kind not in TABLE_ENDINGS:
+        msg = "The step response of a nonlinear model is written as numbers: give -o FILE.csv."
+        raise ParameterError(msg, parameter="-o", value=arguments.o)
+    if len(model.inputs) != 1:
+        msg = f"A nonlinear model takes a step of one input; choose it by --inputs: {listed(model.inputs)}."
+        raise ParameterError(msg, parameter="--inputs", value=model.inputs)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LostStateWarning)  # of the tangent that only says how long to look
+        system = mech2ss(model.tangent())
+    times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
+    save_response(nonlinear_response(model, times, arguments.amplitude), arguments.o)
+    return DONE
+
+
+def _model(arguments: argparse.Namespace) -> SecondOrderModel:
+    """Return the model of a command that works on linear ones: of a nonlinear one, the tangent at rest."""
+    model = _given_model(arguments)
+    return model.tangent() if isinstance(model, NonlinearModel) else model
+
+
+def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearModel:
+    """Make the built-in model or load the file, add elements, and select its signals."""
+    name: str = arguments.model
+    signals: _Signals | None = None
+    model: SecondOrderModel | NonlinearModel
+    if name in BUILT_IN:
+        if arguments.matrix or arguments.triangle or arguments.remove_fixed:
+            msg = f"--matrix, --triangle and --remove-fixed are about files; {name} is built in."
+            raise ParameterError(msg, parameter="--matrix", value=arguments.matrix)
+        signals = BUILT_IN_SIGNALS[name]
+        model = BUILT_IN[name](**_parameters(name, arguments.p))
+    else:
+        if arguments.p:
+            msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN)}); {name} is a file."
+            raise ParameterError(msg, parameter="-p", value=arguments.p)
+        if not Path(name).exists() and Path(name).suffix.lower() not in MATRIX_ENDINGS:
+            msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
+            raise FileFormatError(msg, path=name)
+        model = load_model(name, **_file_options(arguments))
+    elements = [element_from_text(text) for text in arguments.element]
+    if elements:
+        known = model.elements if isinstance(model, NonlinearModel) else ()
+        model = nlmechss(model.linear if isinstance(model, NonlinearModel) else model, [*known, *elements])
+    inputs, outputs = signals or (None, None)
+    return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
+
+
+class _FileOptions(TypedDict):
+    triangle: Triangle | None
+    remove_fixed: bool
+    matrices: dict[str, str | None] | None
+
+
+def _file_options(arguments: argparse.Namespace) -> _FileOptions:
+    """Read what `load_model` is to be told about files."""
+    matrices: dict[str, str | None] = {}
+    for text in arguments.matrix:
+        letter, sign, name = text.partition("=")
+        if not (letter and sign):
+            msg = f"--matrix takes a letter and a name, K=NAME, not {text!r}."
+            raise ParameterError(msg, parameter="--matrix", value=text)
+        matrices[letter] = name or None
+    return {"triangle": arguments.triangle, "remove_fixed": arguments.remove_fixed, "matrices": matrices or None}
+
+
+def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]:
+    """Return the DOFs that are moved: those asked for, that of the built-in model, or the only one."""
+    default = BUILT_IN_DOF.get(arguments.model, model.dofs[0] if len(model.dofs) == 1 else None)
+    if arguments.dof is None and default is None:
+        msg = f"--dof must name the DOF whose dynamic stiffness is meant: {listed(model.dofs)}."
+        raise ParameterError(msg, parameter="--dof", value=None)
+    return _listed(arguments.dof, [str(default)])
+
+
+def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
+    known = list(inspect.signature(BUILT_IN[name]).parameters)
+    parameters = _assignments(given, "-p")
+    for symbol in parameters:
+        if symbol not in known:
+            msg = f"{name} has no parameter {symbol!r}. Known: {', '.join(known)}."
+            raise ParameterError(msg, parameter=symbol, value=parameters[symbol])
+    return parameters
+
+
+def _assignments(given: Sequence[str], option: str) -> dict[str, float]:
+    """Read NAME=VALUE texts."""
+    values: dict[str, float] = {}
+    for text in given:
+        name, _, value = text.rpartition("=")
+        if not name:
+            msg = f"{option} takes a name and a number, NAME=VALUE, not {text!r}."
+            raise ParameterError(msg, parameter=option, value=text)
+        if name in values:
+            msg = f"{option} gives {name} twice."
+            raise ParameterError(msg, parameter=option, value=text)
+        values[name] = _number(value, f"{option} {name}")
+    return values
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        return float(text)
+    except ValueError as cause:
+        msg = f"{what} must be a number, not {text!r}."
+        raise ParameterError(msg, parameter=what, value=text) from cause
+
+
+@overload
+def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]: ...
+
+
+@overload
+def _listed(given: Sequence[str] | None, default: None) -> list[str] | None: ...
+
+
+def _listed(given: Sequence[str] | None, default: Sequence[str] | None) -> list[str] | None:
+    """Split lists with commas; None where nothing is given and there is no default."""
+    if given is None:
+        return None if default is None else list(default)
+    return [name.strip() for text in given for name in text.split(",") if name.strip()]
+
+
+def _frequencies(
+    default: Callable[[], np.ndarray],
+    arguments: argparse.Namespace,
+    *,
+    linear: bool = False,
+    usual: int = DEFAULT_POINTS,
+) -> np.ndarray | None:
+    """Choose the frequencies [rad/s] if any of the limits or their number is given, the others from a default grid."""
+    low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
+    if low is None and high is None and points is None:
+        return None
+    around = default() if low is None or high is None else np.zeros(0)
+    low = around[0] if low is None else low
+    high = around[-1] if high is None else high
+    if not (math.isfinite(high) and 0.0 <= low < high and (linear or low > 0.0)):
+        msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
+        raise ParameterError(msg, parameter="--omega-min", value=low)
+    points = usual if points is None else points
+    if not FEWEST_POINTS <= points <= MOST_POINTS:
+        msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
+        raise ParameterError(msg, parameter="--points", value=points)
+    return np.linspace(low, high, points) if linear else np.geomspace(low, high, points)
+
+
+def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
+    """Add the displacements of DOFs without inertia to the outputs, as the figure shows them."""
+    if model.is_sparse and len(model.dofs) > MOST_RECOVERED:
+        return model
+    part = exact_reduction(model).partition
+    known = motions(model.dofs)
+    extra = [name for name in (*part.half, *part.static) if name in known and name not in model.outputs]
+    return model.select(outputs=[*model.outputs, *extra])
+
+
+def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[StateFeedback, str]:
+    weights = {kind: _assignments(_listed(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
+    if arguments.energy is None and not any(weights.values()):
+        return default_design(model)
+    return lqr(
+        model,
+        displacement=weights["displacement"],
+        velocity=weights["velocity"],
+        acceleration=weights["acceleration"],
+        effort=weights["effort"],
+        energy=arguments.energy,
+    ), ""
+
+
+def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
+    """Refuse an ending before anything is computed."""
+    return None if path is None else ending(path, known)

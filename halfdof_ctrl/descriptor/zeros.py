@@ -1,0 +1,99 @@
+"""Invariant zeros: the finite eigenvalues of the second-order system pencil.
+
+[ P(s)  -B(s) ]
+[ F(s)   D(s) ]                                                                        (9)
+"""
+
+import warnings
+
+import numpy as np
+import scipy.linalg
+
+from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
+from halfdof_ctrl.base.spectrum import sorted_eigenvalues
+from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.growth import system_pencil
+from halfdof_ctrl.descriptor.minors import invariant_zeros
+from halfdof_ctrl.descriptor.regularity import require_regular
+from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
+from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.second_order import SecondOrderModel
+
+
+def zeros(model: SecondOrderModel) -> ComplexArray:
+    """Find the invariant zeros from the second-order system pencil.
+
+    The pencil keeps the mechanical form, so that no zeros are lost or invented where a state space
+    would have long chains at infinity.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Of any index, with any number of inputs and outputs, dependent or not.
+
+    Returns
+    -------
+    (k,) complex ndarray
+        Where the system pencil has a lower rank than almost everywhere [rad/s], as often as the greatest common
+        divisor of its largest minors has that root, sorted by size; zeros at the origin are exactly zero. Among them
+        are poles of motions that the inputs do not reach or the outputs do not show; the others are the transmission
+        zeros.
+
+    Warns
+    -----
+    CloseDecisionWarning
+        Inputs or outputs are so nearly dependent that the number of zeros may be wrong.
+
+    Raises
+    ------
+    SingularPencilError
+        ``det P(s)`` vanishes identically.
+
+    Notes
+    -----
+    Their number is exact for the stored numbers, and their values are refined as those of `pencil_structure` are. For
+    other numbers of outputs than inputs, and for dependent ones, zeros are what two random combinations of the largest
+    minors have in common (`minors`). Two outputs together vanish less often than one alone, and a model that does not
+    respond at all has the zeros of the rank that is left.
+
+    Examples
+    --------
+    A mass on a damper and a spring, velocity as output: one zero, at the origin.
+
+    >>> zeros(mechss([[1]], [[2]], [[3]], [[1]], G=[[1]]))
+    array([0.+0.j])
+
+    Two oscillators; the force on the first cannot be seen in the first where the second stands still as an absorber,
+    at 2 rad/s:
+
+    >>> zeros(mechss(np.eye(2), None, [[5, -4], [-4, 4]], [1, 0], [1, 0])).imag.round(9).tolist()
+    [2.0, -2.0]
+    """
+    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
+    require_regular(model)
+    every = _independent(model)
+    found = invariant_zeros(system_pencil(model, *every))
+    if found.doubts:
+        msg = (
+            f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs "
+            "depend on each other but for rounding, or the model is rounded; leave one out by select() and compare."
+        )
+        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    return sorted_eigenvalues(found.values)
+
+
+def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
+    """Pick outputs and inputs of which no one is a constant combination of others, as those change no zero."""
+    inputs = np.vstack([model.B, model.Bv, model.Ba, model.D, model.Dv, model.Da])
+    outputs = np.hstack([model.F, model.G, model.H, model.D, model.Dv, model.Da])
+    return _independent_columns(outputs.T), _independent_columns(inputs)
+
+
+def _independent_columns(matrix: Matrix) -> list[int]:
+    """Pick columns that span the range."""
+    rows, columns = equilibrating_powers(np.abs(matrix))
+    _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
+    pivots = np.abs(np.diagonal(triangle))
+    rank = int(np.count_nonzero(pivots > ZERO_PIVOT * max(matrix.shape) * pivots[0]))
+    return sorted(order[:rank].tolist())

@@ -1,0 +1,89 @@
+"""Matrices that CalculiX writes with ``*FREQUENCY, SOLVER=MATRIXSTORAGE``.
+
+    job.sti, job.mas     row, column, value: the upper triangle of stiffness and mass, 14 digits, zeros among them
+    job.dof              a line for each row: node.DOF, as 5.1
+
+Constrained DOFs are not in the files. Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine
+``matrixstorage``.
+"""
+
+import re
+
+import numpy as np
+
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.digits import known_to
+from halfdof_ctrl.files.formats.labels import dof_names
+from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, assembled
+from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
+
+KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
+DOFS = ".dof"
+LABEL = re.compile(rb"(\d{1,10})\.(\d{1,2})")
+COLUMNS = 3
+
+
+def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
+    r"""Read a matrix.
+
+    Parameters
+    ----------
+    content : bytes
+        The whole file.
+    ending : {".sti", ".mas"}
+    most_rows : int
+        A larger row number is taken for damage.
+
+    Raises
+    ------
+    FileFormatError
+        Lines that are no row, column and value; numbers from zero; no line at all.
+
+    Examples
+    --------
+    >>> raw = read_calculix(b"1 1  4.0e+00\n1 2 -1.0e+00\n2 2  3.0e+00\n", ".sti", 2)
+    >>> raw.letter, raw.matrix.toarray().tolist()
+    ('K', [[4.0, -1.0], [-1.0, 3.0]])
+    """
+    table = number_rows(content, COLUMNS, comment="#")
+    places = whole_numbers(table[:, :2], "row and column numbers") - 1
+    size = int(places.max(initial=-1)) + 1
+    if not 0 < size <= most_rows or places.min() < 0:
+        msg = f"rows of row, column and value, counted from 1 to {size}, do not make a matrix. The file is damaged."
+        raise FileFormatError(msg, path="")
+    one_sided = bool((places[:, 0] <= places[:, 1]).all() or (places[:, 0] >= places[:, 1]).all())
+    return assembled(
+        places[:, 0],
+        places[:, 1],
+        table[:, 2],
+        (size, size),
+        declared="symmetric" if one_sided else "unsymmetric",
+        format="CalculiX",
+        letter=KIND_BY_ENDING[ending],
+        open_size=True,
+        known_to=known_to(content),
+    )
+
+
+def read_dofs(content: bytes) -> tuple[str, ...]:
+    r"""Read the names of the rows.
+
+    Raises
+    ------
+    FileFormatError
+        A line that is not node.DOF.
+
+    Examples
+    --------
+    >>> read_dofs(b"5.1\n5.3\n60.2\n")
+    ('n5_u1', 'n5_u3', 'n60_u2')
+    """
+    lines = content.split()
+    found = [LABEL.fullmatch(line) for line in lines]
+    wrong = next((number for number, match in enumerate(found, start=1) if match is None), 0)
+    if wrong or not lines:
+        shown = lines[wrong - 1][:60].decode("latin-1") if lines else ""
+        msg = f"a node and its DOF belong into each line, as 5.1, not {shown!r}. The file is damaged."
+        raise FileFormatError(msg, path="", line=wrong or 1)
+    labels = np.array([(int(match[1]), int(match[2])) for match in found if match], dtype=np.int64)
+    return dof_names(labels[:, 0].tolist(), labels[:, 1].tolist())

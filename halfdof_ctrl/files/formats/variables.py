@@ -1,0 +1,87 @@
+"""A variable of a file that holds several by name: what it is, known before it is read."""
+
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, TypeAlias
+
+import numpy.typing as npt
+from scipy.sparse import csc_array
+
+from halfdof_ctrl.base.errors import FileFormatError
+
+Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
+Kind: TypeAlias = Literal["matrix", "text", "struct", "cell", "object"]
+
+MOST_PARTS = 1000  #: of a struct or cell array that are listed
+EXPANSION = 10  #: bytes that are unpacked of a packed byte
+FREE_BYTES = 2**26  #: that may be unpacked whatever the file's length: 2800 x 2800 numbers, mostly zeros
+PLANE = 2  #: dimensions of a matrix
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Variable:
+    """What a file says of a variable before its numbers are read."""
+
+    name: str  #: ``K``; in a struct ``sys.K``, in a cell array ``K{2}``
+    kind: Kind  #: "object" is what cannot be read: functions, classes, pickled objects
+    shape: tuple[int, ...]
+    read: Callable[[], Value]  #: raises what damaged bytes make of it, and FileFormatError for another kind
+    parts: Callable[[], list["Variable"]] = list  #: of a struct or cell array
+
+    @property
+    def is_matrix(self) -> bool:
+        """Whether it has rows and columns of numbers, and more than one of them."""
+        return self.kind == "matrix" and len(self.shape) == PLANE and max(self.shape) > 1
+
+    @property
+    def words(self) -> str:
+        """Name, kind and size for people."""
+        size = " x ".join(map(str, self.shape)) or "a number"
+        return f"{self.name} ({size if self.kind == 'matrix' else self._kind_in_words()})"
+
+    def _kind_in_words(self) -> str:
+        if self.kind == "cell":
+            return "cell array of matrices" if _has_matrix(self.parts) else "cell array"
+        return {"struct": "struct", "text": "text", "object": "object, not numbers"}.get(self.kind, self.kind)
+
+
+def _has_matrix(parts: Callable[[], list[Variable]]) -> bool:
+    try:
+        return any(part.is_matrix for part in parts())
+    except (ValueError, LookupError, TypeError, OSError, zlib.error):  # damaged, and only to be named
+        return False
+
+
+def most_unpacked(length: int) -> int:
+    """Return how many bytes may be unpacked from so many.
+
+    >>> most_unpacked(1) == FREE_BYTES, most_unpacked(10**9)
+    (True, 10000000000)
+    """
+    return max(EXPANSION * length, FREE_BYTES)
+
+
+def require_room(name: str, size: int, length: int) -> None:
+    """Refuse to unpack a variable that is out of proportion to its file.
+
+    Raises
+    ------
+    FileFormatError
+        It has more bytes than `most_unpacked` allows.
+    """
+    if size > most_unpacked(length):
+        msg = (
+            f"{name} would take {size} bytes, more than are unpacked from {length}. If it is no damage but a matrix of "
+            "zeros mostly, save it sparse."
+        )
+        raise FileFormatError(msg, path="")
+
+
+def another_kind(name: str) -> FileFormatError:
+    """Make the refusal of what is neither numbers nor names."""
+    msg = (
+        f"{name} is a struct, string or other object, where numbers or names should be. Save plain matrices, and "
+        f"names as cellstr; of a struct by  save(file, '-struct', '{name}')."
+    )
+    return FileFormatError(msg, path="")

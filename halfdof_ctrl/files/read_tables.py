@@ -1,0 +1,135 @@
+"""The way back of `save_response`: tables of frequency and time responses."""
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import control
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.names import control_labels
+from halfdof_ctrl.files.containers import PathLike, ending
+from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD
+
+
+def load_response(path: PathLike) -> control.FrequencyResponseData | control.TimeResponseData:
+    """Read a response that `save_response` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+        Ends in ``.csv``.
+
+    Returns
+    -------
+    control.FrequencyResponseData or control.TimeResponseData
+        With the values and names that were saved, to the last bit. Of a time response outputs and times; its states
+        and inputs are not in the table.
+
+    Raises
+    ------
+    FileFormatError
+        Another ending, or a table that is not one of `save_response`; `line` says where.
+    OSError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> data = frequency_response(hydromount().select("F_y", "y"), [1.0, 2.0])
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     save_response(data, f"{folder}/h.csv")
+    ...     back = load_response(f"{folder}/h.csv")
+    >>> bool((back.frdata == data.frdata).all()), back.output_labels
+    (True, ['y'])
+    """
+    ending(path, TABLE_ENDINGS)
+    with Path(path).open(encoding="utf-8-sig", newline="") as stream:
+        rows = list(csv.reader(stream))
+    header = rows[0] if rows else []
+    if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
+        return _frequency_response(header, _numbers(rows, path), path)
+    if header[:1] == [TIME_HEAD]:
+        return _time_response(header[1:], _numbers(rows, path))
+    msg = (
+        f"{path}: the first line is no header of a response: it must begin with {FREQUENCY_HEAD[0]!r} and "
+        f"{FREQUENCY_HEAD[1]!r}, or with {TIME_HEAD!r}, as save_response writes it."
+    )
+    raise FileFormatError(msg, path=str(path), line=1)
+
+
+def _numbers(rows: Sequence[Sequence[str]], path: PathLike) -> FloatArray:
+    """Read all lines but the first as numbers, (columns, rows)."""
+    values = np.empty((len(rows) - 1, len(rows[0])))
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(rows[0]):
+            msg = f"{path}, line {number}: {len(row)} entries where the header has {len(rows[0])}. Is the file whole?"
+            raise FileFormatError(msg, path=str(path), line=number)
+        try:
+            values[number - 2] = [float(entry) for entry in row]
+        except ValueError as cause:
+            msg = f"{path}, line {number}: {cause}."
+            raise FileFormatError(msg, path=str(path), line=number) from cause
+    return values.T
+
+
+def _frequency_response(header: Sequence[str], values: FloatArray, path: PathLike) -> control.FrequencyResponseData:
+    first, count = len(FREQUENCY_HEAD), len(PARTS)
+    channels = [name.removesuffix(f" {PARTS[0]}") for name in header[first::count]]
+    expected = [f"{channel} {part}" for channel in channels for part in PARTS]
+    grid = _grid(channels)
+    if list(header[first:]) != expected or not channels or grid is None:
+        msg = (
+            f"{path}: the columns are not {', '.join(PARTS)} of channels 'output/input', as save_response writes them."
+        )
+        raise FileFormatError(msg, path=str(path), line=1)
+    outputs, inputs = grid
+    parts = values[first:].reshape(len(outputs), len(inputs), count, -1)
+    response = np.empty(parts[:, :, 0].shape, dtype=np.complex128)
+    response.real, response.imag = parts[:, :, 0], parts[:, :, 1]
+    return control.FrequencyResponseData(
+        response,
+        values[0],
+        0,
+        inputs=list(control_labels(inputs)),
+        outputs=list(control_labels(outputs)),
+        plot_type="bode",
+    )
+
+
+def _time_response(names: Sequence[str], values: FloatArray) -> control.TimeResponseData:
+    grid = _grid(names)
+    if grid is None:
+        return control.TimeResponseData(
+            values[0], values[1:], output_labels=list(control_labels(tuple(names))), issiso=len(names) == 1
+        )
+    outputs, inputs = grid
+    return control.TimeResponseData(
+        values[0],
+        values[1:].reshape(len(outputs), len(inputs), -1),
+        output_labels=list(control_labels(outputs)),
+        trace_labels=[f"From {label}" for label in control_labels(inputs)],
+        trace_types=["step"] * len(inputs),
+        multi_trace=True,
+        issiso=len(outputs) == len(inputs) == 1,
+    )
+
+
+def _grid(channels: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+    """Split channels ``output/input`` into names, which may hold slashes themselves; None where they are no grid."""
+    pieces = channels[0].split("/") if channels else []
+    for cut in range(1, len(pieces)):
+        output = "/".join(pieces[:cut])
+        inputs = []
+        for channel in channels:
+            if not channel.startswith(f"{output}/"):
+                break
+            inputs.append(channel.removeprefix(f"{output}/"))
+        for count in range(len(inputs), 0, -1):
+            last = f"/{inputs[0]}"
+            outputs = [name.removesuffix(last) for name in channels[::count]]
+            if [f"{out}/{source}" for out in outputs for source in inputs[:count]] == list(channels):
+                return tuple(outputs), tuple(inputs[:count])
+    return None

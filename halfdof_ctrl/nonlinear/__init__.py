@@ -1,0 +1,1 @@
+"""Nonlinear models: classification by the whole equation, conversion, simulation, tangent and equilibrium."""

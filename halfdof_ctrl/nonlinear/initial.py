@@ -1,0 +1,55 @@
+"""Initial states by name, checked against the equations without inertia."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import MatrixError
+from halfdof_ctrl.base.names import motion_names, unknown_name_error
+from halfdof_ctrl.model.nonlinear import Values
+from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
+from halfdof_ctrl.nonlinear.recovery import motion_at
+from halfdof_ctrl.reduction.method.recovery import require_consistent
+
+if TYPE_CHECKING:
+    from halfdof_ctrl.nonlinear.reduction import NonlinearReduction
+
+
+def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Values, t: float = 0.0) -> FloatArray:
+    """Return the state for displacements and velocities by name, as `NonlinearModel.state` describes it."""
+    u = constant_inputs(inputs, reduction.model.inputs)
+    N = len(reduction.states)
+    if initial is None:
+        initial = {}
+    if not isinstance(initial, Mapping):
+        x = np.asarray(getattr(initial, "state", initial), dtype=float)
+        if x.ndim == 0 and N:
+            x = np.full(N, float(x))
+        if x.shape != (N,) or not np.isfinite(x).all():
+            msg = (
+                f"A state of this model has {N} finite numbers, {', '.join(reduction.states)}, not the shape "
+                f"{x.shape}. "
+                "Give displacements and velocities by name."
+            )
+            raise MatrixError(msg, matrix="initial")
+        return np.array(x)
+    dofs = reduction.model.dofs
+    names = (*motion_names(dofs, 0), *motion_names(dofs, 1))
+    given = np.full(len(names), np.nan)
+    for name, value in initial.items():
+        if name not in names:
+            raise unknown_name_error(name, "displacement or velocity", names)
+        given[names.index(name)] = float(value)
+    if np.isinf(given).any():
+        msg = "Initial displacements and velocities must be finite numbers."
+        raise MatrixError(msg, matrix="initial")
+    q, v = given[: len(dofs)], given[len(dofs) :]
+    x = reduction.partition.state_of(np.nan_to_num(q), np.nan_to_num(v))
+    if reduction.linear.shift:
+        x = x - reduction.linear.shift[0][:, : u.size] @ u
+    required = motion_at(reduction, t, x, u, np.zeros_like(u))
+    for derivative, wanted in enumerate((q, v)):
+        require_consistent(motion_names(dofs, derivative), wanted, required[derivative])
+    return x

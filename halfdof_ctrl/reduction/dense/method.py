@@ -1,0 +1,227 @@
+"""The methods by one dense solve of (3): a selection of DOFs, or orthonormal bases of null spaces."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.linalg
+
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.errors import SingularLeadingMatrixError
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR, LeadingMatrix
+from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
+from halfdof_ctrl.reduction.dense.partition import DofPartition
+from halfdof_ctrl.reduction.dense.selection import select_columns
+from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
+from halfdof_ctrl.reduction.method.evidence import CLOSE, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
+from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
+from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal
+
+NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
+SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
+ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
+SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
+SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
+LOST = 1e-9  #: by the rounding of A and B at most, from which on other coordinates are tried ...
+LOOKED_AT = 1e-12  #: ... where that much is lost indeed
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SingleSolve:
+    """A reduction by one dense solve of (3): a `ReductionMethod`."""
+
+    model: SecondOrderModel
+    coordinates: DofPartition
+    leading: LeadingMatrix  #: W of equation (2), factorized
+    equations: StateEquations
+    loss: Loss = NOTHING_LOST  #: measured where W asks for it
+
+    @property
+    def name(self) -> MethodName:
+        """`selection` or `orthogonal`."""
+        return self.coordinates.method
+
+    @property
+    def A(self) -> FloatArray:  # noqa: N802
+        """(N, N) state matrix."""
+        return self.equations.A
+
+    @property
+    def B(self) -> FloatArray:  # noqa: N802
+        """(N, m) input matrix."""
+        return self.equations.B
+
+    @property
+    def shift(self) -> tuple[FloatArray, ...]:
+        """E_0, E_1 of equation (5)."""
+        return self.equations.shift
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the states rest on."""
+        rcond, n = self.leading.rcond, len(self.model.dofs)
+        return Evidence(
+            decisions=self.coordinates.evidence,
+            light=self.coordinates.light,
+            rcond=rcond,
+            loss=self.loss,
+            hardly=rcond < CLOSE * n * SINGULAR,
+        )
+
+    @property
+    def input_derivatives(self) -> int:
+        """How many derivatives of the inputs the velocities may contain."""
+        return len(self.equations.displacement.U)
+
+    def index(self) -> int:
+        """Return 1 where there are static coordinates, else 0."""
+        return int(self.coordinates.n_static > 0)
+
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return output_signal(model, self.equations, self._rounding)
+
+    def motion(self, derivative: int) -> Signal:
+        """Return a derivative of all DOFs."""
+        return self.equations.motion(derivative)
+
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return a derivative of all DOFs for given states and inputs."""
+        return self.equations.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A with zeros for entries that may be rounding of zero.
+
+        An entry of the solution ``W^-1 R`` of (3) is known to ``u |W^-1| (|W| |W^-1| |R| + |R|)`` times a small number.
+        """
+        model, part = self.model, self.coordinates
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        size = np.abs(leading_columns(model, part))
+        inverse = np.abs(self.leading.solve(np.eye(len(size))))
+        right = np.abs(np.hstack([part.times_basis(model.K, 0, moving), part.times_basis(model.C, 0, n_i)]))
+        doubt = ENTRY_ROUNDING * (inverse @ (size @ (inverse @ right) + right))
+        A = self.A.copy()
+        rows = np.vstack([doubt[n_i:moving], doubt[:n_i]])
+        A[n_i:][np.abs(A[n_i:]) <= rows] = 0.0
+        return A
+
+    def decisions(self) -> tuple[RankDecision, ...]:
+        """Return the decisions of the coordinates and the singular values of W."""
+        values = self.leading.singular_values()
+        bound = len(values) * SINGULAR * float(values.max(initial=0.0))
+        regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
+        return (*self.coordinates.evidence, regular)
+
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the response of all DOFs to forces, by the factors of W."""
+        part, both = self.coordinates, np.hstack([force.real, force.imag])
+        real, imag = np.hsplit(self.leading.solve(np.asfortranarray(both)), 2)
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        solved = real + 1j * imag
+        rate = np.concatenate([np.zeros_like(solved[:n_i]), solved[n_i:moving], solved[:n_i]])
+        moved = self.equations.displacement.X @ states.solve(rate)
+        return np.asarray(moved + part.T[:, moving:] @ solved[moving:])
+
+    def inverse_rows(self) -> FloatArray:
+        """Return gamma and alpha."""
+        moving = self.coordinates.n_inertial + self.coordinates.n_half
+        return self.leading.solve(np.eye(len(self.model.dofs)))[:moving]
+
+    def _rounding(self) -> Rounding:
+        return rounding_of_solve(self.model, self.coordinates, self.leading, self.equations)
+
+
+def by_selection(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SingleSolve | None:
+    """Propose a selection of DOFs and prove it; None if it fails and was not asked for.
+
+    Raises
+    ------
+    SingularLeadingMatrixError
+        It was asked for, and W is singular to working precision.
+    """
+    found = _solved(model, select_columns(model, tol), asked=asked)
+    if found is None:
+        return None
+    settled = asked or tol is not None or found.leading.rcond > SURELY_REGULAR
+    return _chosen(found, tol, asked=asked) if settled or has_spectrum(model, found.A) else None
+
+
+def by_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SingleSolve | None:
+    """Propose orthonormal bases and prove them; None if they fail and were not asked for.
+
+    Bases of null spaces rest on rank decisions, so that (19) has to hold whatever the condition of W.
+
+    Raises
+    ------
+    SingularLeadingMatrixError
+        They were asked for, and W is singular to working precision.
+    """
+    found = _solved(model, orthonormal_bases(model, tol), asked=asked)
+    if found is None:
+        return None
+    settled = asked or tol is not None
+    return _chosen(found, tol, asked=asked) if settled or has_spectrum(model, found.A) else None
+
+
+def _solved(model: SecondOrderModel, coordinates: DofPartition, *, asked: bool = False) -> SingleSolve | None:
+    """Solve (3); None if W is singular and the coordinates were not asked for."""
+    W = leading_columns(model, coordinates)
+    leading = LeadingMatrix.factorized(W)
+    if leading.is_singular:
+        if asked:
+            raise _singular_error(model, coordinates, W, leading)
+        return None
+    equations = solved_at_once(model, coordinates, leading)
+    return SingleSolve(model=model, coordinates=coordinates, leading=leading, equations=equations)
+
+
+def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolve:
+    """Measure what is lost, and take other coordinates if these keep it.
+
+    Nothing worth a look is lost where the columns of a plainly regular W are those of M, C and K themselves.
+    """
+    if tol is not None or (found.leading.is_plainly_regular and found.coordinates.basis is None):
+        return found
+    measured = replace(found, loss=measured_loss(found))
+    if asked or measured.loss.value < LOOKED_AT:
+        return measured
+    better = _in_better_coordinates(found)
+    return measured if better is None else replace(better, loss=measured_loss(better))
+
+
+def _in_better_coordinates(found: SingleSolve) -> SingleSolve | None:
+    """Give directions of little mass coordinates of their own, where that keeps digits that DOFs lose.
+
+    That is decided by bounds and not by what was measured, so that the choice is the same in any units.
+    """
+    model, lost = found.model, expected_loss(found.model, found.equations)
+    if lost <= LOST:
+        return None
+    other = _solved(model, orthonormal_bases(model, widest=SPREAD))
+    if other is None or len(other.A) != len(found.A) or expected_loss(model, other.equations) > SAVED * lost:
+        return None
+    return other
+
+
+def _singular_error(
+    model: SecondOrderModel, partition: DofPartition, W: FloatArray, leading: LeadingMatrix
+) -> SingularLeadingMatrixError:
+    """Make the refusal of a singular W, naming the DOFs of its null vector."""
+    rows, columns = equilibrating_factors(W)
+    _, _, right = scipy.linalg.svd(W * rows[:, None] * columns)
+    null = np.abs(right[-1])
+    concerned = partition.T[:, null > NULL_VECTOR_SHARE * null.max()].any(axis=1)
+    dofs = tuple([model.dofs[index] for index in np.flatnonzero(concerned).tolist()])
+    msg = (
+        f"The leading matrix W = [M T_i, C T_c, K T_k] is singular to working precision (rcond {leading.rcond:.1e}, "
+        f"by {partition.method}): the equations of motion do not determine the highest derivatives of DOFs "
+        f"{listed(dofs)}. Either a rigid constraint or an algebraic loop of dampers or springs ties them (index "
+        "above one), or nothing resists their motion; pencil_structure tells which. Leave method out, so that "
+        "deflation is tried, or give them the mass, damper or spring that the model left out."
+    )
+    return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)

@@ -1,0 +1,1 @@
+"""States whose squares are energy: strain and momentum in place of displacement and velocity."""

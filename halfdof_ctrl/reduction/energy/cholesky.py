@@ -1,0 +1,79 @@
+"""Cholesky factors that keep what the entries of a matrix determine.
+
+``K = U^T U`` by Cholesky's method errs by a few roundings of the largest entries, which is far more than the stored
+entries leave open where the stiffness of a structure ranges over many decades. One Newton step with the residual in
+twice the working precision repairs that:
+
+    E = K - U^T U,    G = U^-T E U^-1,    U <- (I + striu(G) + diag(G) / 2) U                  (23)
+
+It would fill exact zeros with roundings; above the first entry of a column of K the factor is zero, and is kept so.
+"""
+
+import numpy as np
+import scipy.linalg
+from scipy.linalg.lapack import dpotrf
+
+from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
+from halfdof_ctrl.base.matrix_residual import exact_residual
+
+CORRECTED_FACTOR = 1e-8  #: a correction of this size leaves errors of its square, which is below rounding
+MOST_CORRECTIONS = 3  #: one does, but for matrices that are singular to twelve digits
+DIVERGED_FACTOR = 0.5  #: a correction of this size does not come from rounding: the factor is of no use
+
+
+def corrected_factor(K: FloatArray) -> FloatArray | None:
+    """Factorize a symmetric matrix as ``U^T U``, better than its rounded factorization does.
+
+    Parameters
+    ----------
+    K : (n, n) ndarray
+        Symmetric.
+
+    Returns
+    -------
+    (n, n) ndarray or None
+        U, upper triangular, with a positive diagonal; None where K is not positive definite to working precision.
+
+    Examples
+    --------
+    >>> corrected_factor(np.array([[4.0, 2.0], [2.0, 10.0]])).tolist()
+    [[2.0, 1.0], [0.0, 3.0]]
+    """
+    diagonal = np.diagonal(K)
+    if not (diagonal > 0.0).all():
+        return None
+    if np.count_nonzero(K) == len(K):
+        return np.diag(np.sqrt(diagonal))
+    scale = powers_of_two(np.sqrt(diagonal))
+    scaled = scale[:, None] * K * scale
+    U, failed = dpotrf(scaled, lower=0, clean=1)
+    if failed:
+        return None
+    inside = _envelope(scaled)
+    for _ in range(MOST_CORRECTIONS):
+        G = _congruent(U, exact_residual(scaled, U.T, U))
+        size = float(np.abs(G).max(initial=0.0))
+        if not size < DIVERGED_FACTOR:
+            return None
+        U = U + np.where(inside, (np.triu(G, 1) + np.diag(np.diagonal(G) / 2.0)) @ U, 0.0)
+        if size <= CORRECTED_FACTOR:
+            break
+    return np.asarray(U / scale)
+
+
+def solved(U: FloatArray, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+    """Return ``U^-1 right``, or ``U^-T right``, for an upper triangular U."""
+    if U.size == 0:
+        return np.array(right)
+    return np.asarray(scipy.linalg.solve_triangular(U, right, trans="T" if transposed else "N", check_finite=False))
+
+
+def _congruent(U: FloatArray, E: FloatArray) -> FloatArray:
+    """Return ``U^-T E U^-1`` for a symmetric E."""
+    half = solved(U, E, transposed=True)
+    return solved(U, half.T, transposed=True)
+
+
+def _envelope(K: FloatArray) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
+    """Mark the entries from the first nonzero one of each column down to the diagonal."""
+    return np.triu(np.logical_or.accumulate(K != 0.0, axis=0))

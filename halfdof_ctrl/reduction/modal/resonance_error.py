@@ -1,0 +1,182 @@
+"""How far the resonances of a small model are from those of the full one, one solve with the full model each.
+
+A pole s_i of the small model with the vector v_i, in the coordinates of the full model x = shapes v_i, is improved by
+one step of inverse iteration with the full matrices, and the Rayleigh quotient of the quadratic problem,
+
+    w = P(s_i)^-1 (C + 2 s_i M) x,    (w^T M w) s^2 + (w^T C w) s + w^T K w = 0,
+
+whose root nearest to s_i is the full model's pole to twice the digits of w. The shift of frequency and of damping, and
+the change of the residue (F w)(w^T B) / (w^T (C + 2 s M) w), are the error where a value at a needle-sharp resonance
+says nothing: any shift at all is an error of many times the value there. Poles closer than one per cent are improved
+together, by a block and its Rayleigh-Ritz problem. Below u |w|^T |K| |w| / (w^T K w) a shift is not told from rounding.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg
+from scipy.sparse import csc_array
+from scipy.sparse.linalg import splu
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.model.second_order import SecondOrderModel
+
+LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked: errors grow towards its end
+TOGETHER = 0.01  #: relative distance of poles that are improved together
+LARGEST_GROUP = 12  #: poles that are improved together at most
+ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
+UNDAMPED = 1e-6  #: of its size: the real part of a pole that counts as undamped here
+SILENT = 1e-3  #: of the largest residue over its pole's size: resonances that show less in a channel are no part of it
+OVERDAMPED = 0.7  #: damping ratio of what is no resonance
+UNIT = float(np.finfo(float).eps) / 2.0
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ResonanceErrors:
+    """Errors of k resonances in the band, by rising frequency."""
+
+    frequencies: FloatArray  #: (k,) of the small model [Hz]
+    frequency_shift: FloatArray  #: (k,) relative to the frequency
+    damping_shift: FloatArray  #: (k,) of the damping ratio
+    height: FloatArray  #: (k,) change of the residues, relative, in the channel where it is largest
+    floor: FloatArray  #: (k,) relative shift of frequency that rounding of the full model's K may make
+    poles: ComplexArray  #: (k,) of the small model [rad/s]
+
+
+def resonance_errors(
+    parts: dict[str, SparseMatrix], small: SecondOrderModel, basis: FloatArray, band: tuple[float, float]
+) -> ResonanceErrors:
+    """Measure the shift of the resonances in a band.
+
+    Parameters
+    ----------
+    parts : mapping from letter to csc_array
+        Of the full model of n DOFs.
+    small : SecondOrderModel
+        Dense, of r DOFs.
+    basis : (n, r) ndarray
+        Motions of the full model that are the small one's DOFs.
+    band : (float, float)
+        [Hz].
+
+    Returns
+    -------
+    ResonanceErrors
+    """
+    poles, vectors = _resonances(small, band)
+    chosen = np.arange(poles.size)
+    if poles.size > LOWEST + HIGHEST:
+        chosen = np.concatenate([chosen[:LOWEST], chosen[-HIGHEST:]])
+    poles, vectors = poles[chosen], vectors[:, chosen]
+    found, shapes, floor = np.empty_like(poles), np.empty((basis.shape[0], poles.size), dtype=np.complex128), []
+    for group in _groups(poles):
+        found[group], shapes[:, group] = _improved(parts, poles[group], basis @ vectors[:, group])
+    size_of_K: Any = abs(parts["K"])
+    for k in range(poles.size):
+        w = shapes[:, k]
+        stiff: Any = parts["K"] @ w
+        energy = abs(complex(w @ stiff))
+        floor.append(0.5 * UNIT * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
+    return ResonanceErrors(
+        frequencies=np.abs(poles) / (2.0 * np.pi),
+        frequency_shift=np.abs(np.abs(found) - np.abs(poles)) / np.abs(found),
+        damping_shift=np.abs(found.real / np.abs(found) - poles.real / np.abs(poles)),
+        height=_height_errors(parts, small, (poles, vectors), (found, shapes)),
+        floor=np.array(floor),
+        poles=poles,
+    )
+
+
+def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[ComplexArray, ComplexArray]:
+    """Return the poles of the small model with frequencies in the band, and their vectors (r, k)."""
+    n, scale = len(small.dofs), 2.0 * np.pi * band[1]
+    size = np.abs(np.diagonal(small.K)) + scale**2 * np.abs(np.diagonal(small.M))
+    units = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
+    K, C, M = (np.asarray(part) * units * units[:, None] for part in (small.K, scale * small.C, scale**2 * small.M))
+    left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
+    right = scipy.linalg.block_diag(np.eye(n), M)
+    homogeneous, vectors = scipy.linalg.eig(left, right, homogeneous_eigvals=True)
+    alpha, beta = homogeneous
+    with np.errstate(divide="ignore", invalid="ignore"):
+        values = scale * np.asarray(alpha / beta, dtype=np.complex128)
+        frequency = np.abs(values) / (2.0 * np.pi)
+        swings = np.abs(values.real) < OVERDAMPED * np.abs(values)
+    inside = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]) & (values.imag > 0.0) & swings)
+    inside = inside[np.argsort(frequency[inside])]
+    return values[inside], units[:, None] * vectors[:n, inside]
+
+
+def _groups(poles: ComplexArray) -> list[list[int]]:
+    """Put poles that are close side by side into groups."""
+    groups: list[list[int]] = []
+    for k in range(poles.size):
+        near = groups and abs(poles[k] - poles[groups[-1][-1]]) <= TOGETHER * abs(poles[k])
+        if near and len(groups[-1]) < LARGEST_GROUP:
+            groups[-1].append(k)
+        else:
+            groups.append([k])
+    return groups
+
+
+def _improved(
+    parts: dict[str, SparseMatrix], poles: ComplexArray, shapes: ComplexArray
+) -> tuple[ComplexArray, ComplexArray]:
+    """Return the full model's poles nearest to some of the small one's, and their vectors."""
+    K, C, M = (parts[letter] for letter in "KCM")
+    s = complex(poles.mean())
+    if abs(s.real) < UNDAMPED * abs(s):
+        s *= 1.0 + ASIDE * 1j
+    factors = splu(csc_array(K + s * C + s**2 * M))
+    right = C @ shapes + 2.0 * (M @ shapes) * poles
+    w = factors.solve(np.asfortranarray(right, dtype=np.complex128))
+    w = w / np.abs(w).max(axis=0)
+    values, vectors = _quadratic_roots(w.T @ (K @ w), w.T @ (C @ w), w.T @ (M @ w), s)
+    found, places = np.empty_like(poles), []
+    left = list(range(values.size))
+    for k, pole in enumerate(poles.tolist()):
+        place = left[int(np.abs(values[left] - pole).argmin())]
+        left.remove(place)
+        places.append(place)
+        found[k] = values[place]
+    return found, w @ vectors[:, places]
+
+
+def _quadratic_roots(K: Any, C: Any, M: Any, scale: complex) -> tuple[ComplexArray, ComplexArray]:  # noqa: ANN401
+    """Return the roots and vectors of a small quadratic problem with complex symmetric matrices."""
+    n, size = K.shape[0], abs(scale)
+    left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -size * C]])
+    right = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), size**2 * M]])
+    values, vectors = scipy.linalg.eig(left, right)
+    return np.asarray(size * values, dtype=np.complex128), np.asarray(vectors[:n], dtype=np.complex128)
+
+
+def _height_errors(
+    parts: dict[str, SparseMatrix],
+    small: SecondOrderModel,
+    reduced: tuple[ComplexArray, ComplexArray],
+    full: tuple[ComplexArray, ComplexArray],
+) -> FloatArray:
+    """Return the relative change of the residues, in the channel where it is largest."""
+    if reduced[0].size == 0:
+        return np.zeros(0)
+    dense: dict[str, Any] = {letter: np.asarray(getattr(small, letter)) for letter in (*parts,)}
+    first, second = (_residues(matrices, *each) for matrices, each in ((dense, reduced), (parts, full)))
+    weight = np.abs(second) / np.abs(full[0])[:, None, None]
+    shown = weight > SILENT * weight.max(axis=0, keepdims=True)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        change = np.where(shown, np.abs(first - second) / np.abs(second), 0.0)
+    return np.asarray(np.nan_to_num(change).max(axis=(1, 2)))
+
+
+def _residues(matrices: Any, poles: ComplexArray, vectors: ComplexArray) -> ComplexArray:  # noqa: ANN401
+    """Return ``(F(s) w)(w^T B(s)) / (w^T (C + 2 s M) w)``, (k, p, m)."""
+    residues = []
+    for k, s in enumerate(poles.tolist()):
+        w = vectors[:, k]
+        out = matrices["F"] @ w + s * (matrices["G"] @ w) + s**2 * (matrices["H"] @ w)
+        drive = matrices["B"].T @ w + s * (matrices["Bv"].T @ w) + s**2 * (matrices["Ba"].T @ w)
+        slope = w @ (matrices["C"] @ w) + 2.0 * s * (w @ (matrices["M"] @ w))
+        residues.append(np.outer(out, drive) / slope)
+    return np.array(residues)

@@ -1,0 +1,185 @@
+"""The methods by one sparse solve of (3), for models whose matrices are sparse.
+
+Up to 500 DOFs a sparse model is reduced here only where nothing is near a decision: where W by a selection is plainly
+regular. Otherwise its dense copy is, so that both give the same.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.errors import SingularLeadingMatrixError
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.leading_matrix import plainly_regular
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
+from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
+from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.reduction.sparse.bases import sparse_bases
+from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
+from halfdof_ctrl.reduction.sparse.partition import SparsePartition
+from halfdof_ctrl.reduction.sparse.selection import has_dependent_columns, select_sparse_columns
+from halfdof_ctrl.reduction.sparse.single_solve import require_states, solved_by_rows, sparse_leading_columns
+
+NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
+SMALL = 500  #: DOFs up to which a sparse model is reduced densely where a decision is near
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class SparseSolve:
+    """A reduction by one sparse solve of (3): a `ReductionMethod`."""
+
+    model: SecondOrderModel
+    coordinates: SparsePartition
+    leading: SparseLU  #: W of equation (2), factorized
+    displacement: SparseDisplacement  #: equation (4), worked out where it is asked for
+    loss: Loss = NOTHING_LOST  #: measured where W asks for it
+
+    @property
+    def name(self) -> MethodName:
+        """`selection` or `orthogonal`."""
+        return self.coordinates.method
+
+    @property
+    def A(self) -> FloatArray:  # noqa: N802
+        """(N, N) state matrix."""
+        return self.displacement.A
+
+    @property
+    def B(self) -> FloatArray:  # noqa: N802
+        """(N, m) input matrix."""
+        return self.displacement.B
+
+    @property
+    def shift(self) -> tuple[FloatArray, ...]:
+        """E_0, E_1 of equation (5)."""
+        return self.displacement.shift
+
+    @property
+    def evidence(self) -> Evidence:
+        """What the states rest on."""
+        part = self.coordinates
+        return Evidence(decisions=part.evidence, light=part.light, rcond=self.leading.rcond, loss=self.loss)
+
+    @property
+    def input_derivatives(self) -> int:
+        """How many derivatives of the inputs the velocities may contain."""
+        return len(self.displacement.equation.forces)
+
+    def index(self) -> int:
+        """Return 1 where there are static coordinates, else 0."""
+        return int(self.coordinates.n_static > 0)
+
+    def output(self, model: SecondOrderModel) -> Signal:
+        """Return the outputs of a model that differs in them alone."""
+        return self.displacement.output(model)
+
+    def motion(self, derivative: int) -> Signal:
+        """Return a derivative of all DOFs, where that is no matrix too large."""
+        signal = self.displacement.whole()
+        for _ in range(derivative):
+            signal = signal.derivative(self.A, self.B)
+        return signal
+
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return a derivative of all DOFs for given states and inputs."""
+        return self.displacement.motion_at(x, inputs, derivative)
+
+    def without_rounding(self) -> FloatArray:
+        """Return A as it is: what of it is rounding is not followed entry by entry."""
+        return self.A
+
+    def decisions(self) -> tuple[RankDecision, ...]:
+        """Return the decisions of the coordinates."""
+        return self.coordinates.evidence
+
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the response of all DOFs to forces, by the factors of W."""
+        part = self.coordinates
+        both = np.hstack([force.real, force.imag]) * self.leading.rows[:, None]
+        real, imag = np.hsplit(self.leading.solve(both), 2)
+        solved = (real + 1j * imag)[part.order]
+        n_i, moving = part.n_inertial, part.n_inertial + part.n_half
+        moved = states.solve(np.concatenate([np.zeros_like(solved[:n_i]), solved[n_i:moving], solved[:n_i]]))
+        rest = [np.zeros((self.B.shape[1], force.shape[1]))]
+        q = self.motion_at(moved.real, rest, 0) + 1j * self.motion_at(moved.imag, rest, 0)
+        static = np.zeros_like(solved)
+        static[part.order[moving:]] = solved[moving:]
+        return np.asarray(q + (static if part.columns is None else part.columns @ static))
+
+    def inverse_rows(self) -> FloatArray:
+        """Return gamma and alpha."""
+        return self.displacement.inverse_rows()
+
+
+def by_sparse_selection(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SparseSolve | None:
+    """Propose a selection of DOFs; None if W is singular, or too near it for a model that a dense copy can serve.
+
+    Raises
+    ------
+    SingularLeadingMatrixError
+        It was asked for, and W is singular to working precision.
+    ModelSizeError
+        A or B would be too large.
+    """
+    coordinates = select_sparse_columns(model, tol)
+    require_states(model, coordinates)
+    if not asked and has_dependent_columns(model, coordinates):
+        return None
+    return _solved(model, coordinates, asked=asked)
+
+
+def by_sparse_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SparseSolve | None:
+    """Propose orthonormal bases; None if W is singular, or for a model that a dense copy can serve.
+
+    Raises
+    ------
+    SingularLeadingMatrixError
+        They were asked for, and W is singular to working precision.
+    ModelSizeError
+        A or B would be too large, or M or C connects too many coordinates.
+    """
+    if not asked and len(model.dofs) <= SMALL:
+        return None
+    coordinates = sparse_bases(model, tol)
+    require_states(model, coordinates)
+    return _solved(model, coordinates, asked=asked)
+
+
+@limited_threads(1)
+def _solved(model: SecondOrderModel, coordinates: SparsePartition, *, asked: bool) -> SparseSolve | None:
+    n = len(model.dofs)
+    leading = SparseLU.factorized(sparse_leading_columns(model, coordinates))
+    if leading.is_singular:
+        if asked:
+            raise _singular_error(model, coordinates, leading)
+        return None
+    if not asked and n <= SMALL and leading.rcond < plainly_regular(n):
+        return None
+    displacement = solved_by_rows(model, coordinates, leading)
+    found = SparseSolve(model=model, coordinates=coordinates, leading=leading, displacement=displacement)
+    return found if leading.rcond >= plainly_regular(n) else replace(found, loss=measured_loss(found))
+
+
+def _singular_error(
+    model: SecondOrderModel, partition: SparsePartition, leading: SparseLU
+) -> SingularLeadingMatrixError:
+    """Make the refusal of a singular W, naming the DOFs of its null vector."""
+    null = np.abs(leading.null_vector())
+    concerned = np.flatnonzero(null > NULL_VECTOR_SHARE * null.max())
+    if partition.columns is not None:
+        concerned = np.unique(partition.columns[:, concerned].indices)
+    dofs = tuple([model.dofs[index] for index in concerned.tolist()])
+    msg = (
+        f"The leading matrix W = [M T_i, C T_c, K T_k] is singular to working precision (rcond {leading.rcond:.1e}, "
+        f"by {partition.method}): the equations of motion do not determine the highest derivatives of DOFs "
+        f"{listed(dofs)}. Either a rigid constraint or an algebraic loop of dampers or springs ties them (index "
+        "above one), or nothing resists their motion. Give them the mass, damper or spring that the model left out, "
+        "or eliminate the constraint."
+    )
+    return SingularLeadingMatrixError(msg, dofs=dofs, rcond=leading.rcond)

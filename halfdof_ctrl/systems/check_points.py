@@ -1,0 +1,48 @@
+"""The points at which the cross-check compares transfer functions, and the poles that count as moving."""
+
+import numpy as np
+import numpy.typing as npt
+
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
+
+SMALL_EIGENVALUE = 1e-6  #: of the largest or the typical frequency: eigenvalues below may stand for one at the origin
+EIGENVALUE_AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
+CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
+GRID_POINTS = 60  #: points on the axis besides those at the poles
+MOST_POLE_POINTS = 100  #: poles that get a point of their own
+OFF_AXIS = (1.0 + 0.0j, 1.0 + 1.0j)  #: directions of the points off the axis, in units of a pole's size
+
+
+def moving_eigenvalues(finite: ComplexArray, A: FloatArray, gamma: float) -> ComplexArray:
+    """Leave out eigenvalues at the origin, which QZ finds at the square root of rounding where they are double.
+
+    One counts as at the origin if it is small and its nearest pole of the state space is zero to what A tells.
+    Where none is left, the model's typical frequency stands for the time scale.
+    """
+    poles, rounding = eigenvalues_and_rounding(A)
+    away = finite[np.abs(finite) > EIGENVALUE_AT_ORIGIN * gamma]
+    if poles.size and away.size:
+        nearest = np.abs(away[:, None] - poles).argmin(axis=1)
+        away = away[~(_is_small(away, gamma) & (np.abs(poles) <= rounding)[nearest])]
+    return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
+
+
+def _is_small(eigenvalues: ComplexArray, gamma: float) -> npt.NDArray[np.bool_]:
+    """Return which eigenvalues are so small that they may stand for one at the origin."""
+    return np.asarray(np.abs(eigenvalues) <= SMALL_EIGENVALUE * max(np.abs(eigenvalues).max(initial=0.0), gamma))
+
+
+def check_points(moving: ComplexArray) -> ComplexArray:
+    """Choose points on the imaginary axis around and at the poles, and off the axis."""
+    chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
+    low, high = np.abs(moving).min(), np.abs(moving).max()
+    grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
+    swinging = chosen[chosen.imag > 0.0]
+    lift = np.maximum(0.0, CLEARANCE * np.abs(swinging) - np.abs(swinging.real))
+    at_poles = lift + 1j * swinging.imag
+    at_sizes = 1j * np.abs(chosen)
+    off_axis = np.concatenate([direction * np.array([low, np.sqrt(low * high), high]) for direction in OFF_AXIS])
+    points = np.concatenate([1j * grid, at_poles, at_sizes, off_axis])
+    near = np.abs(points[:, None] - moving).min(axis=1) < CLEARANCE * np.abs(points)
+    return np.where(near, points + CLEARANCE * np.abs(points), points)

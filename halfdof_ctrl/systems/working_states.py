@@ -1,0 +1,200 @@
+"""The states in which responses are computed, whatever states the user has.
+
+Energy coordinates lose a square root of what displacements and velocities lose on stiff structures. But their matrices
+are dense, so that terms cancel in deep roll-off, or where stiff and soft springs meet in a node without mass, that DOF
+states keep apart. A frequency response is evaluated in both, and refined solves of the descriptor form tell which one
+to keep.
+Models without energy coordinates (unsymmetric or indefinite M or K, constraints, masses or dampers that need rotated
+coordinates) are worked in DOF states, scaled by powers of two.
+"""
+
+from functools import partial
+
+import control
+import numpy as np
+import scipy.linalg
+from scipy.linalg.lapack import zgetrf, zgetrs
+
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, powers_of_two
+from halfdof_ctrl.base.exact_products import ExactPolynomial
+from halfdof_ctrl.model.refinement import refined
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.hessenberg import state_space_response
+from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
+from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+
+AGREEMENT = 1e-12  #: relative difference between two evaluations up to which both are right
+SOUND_RESPONSE = (
+    1e-10  #: relative error of energy coordinates at tested points up to which a large model stays with them
+)
+FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
+MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
+
+
+def working_map(reduction: ExactReduction) -> StateMap | None:
+    """Return the states in which a time response is computed; None for a large sparse model, which stays as it is.
+
+    Examples
+    --------
+    >>> working_map(exact_reduction(hydromount())).kind
+    'energy'
+    >>> working_map(exact_reduction(mechss([[1, 0], [0, 1]], None, [[2, 1], [-1, 2]]))).kind
+    'scaled'
+    """
+    model = reduction.model
+    if reduction.order == 0 or (model.is_sparse and _is_large(model)):
+        return None
+    form = energy_system(model)
+    if form is None or len(form.A) != reduction.order:
+        return state_map(reduction, "scaled")
+    return map_of_form(form, "energy", reduction)
+
+
+def working_form(model: SecondOrderModel, order: int) -> EnergyForm | None:
+    """Return the energy coordinates of a model that has `order` states, None where there are none."""
+    form = None if model.is_sparse and _is_large(model) else energy_system(model)
+    return form if form is not None and len(form.A) == order else None
+
+
+def working_matrix(model: SecondOrderModel) -> FloatArray:
+    """Return A in energy coordinates where the model has them, else in DOF states."""
+    reduction = exact_reduction(model)
+    form = working_form(model, reduction.order)
+    return reduction.A if form is None else form.A
+
+
+def model_poles(model: SecondOrderModel) -> ComplexArray:
+    """Return the poles of the state space of a model [rad/s], computed in the states that keep most digits.
+
+    Poles of motions that K and C leave free are exactly 0.
+
+    Raises
+    ------
+    ComplexModelError, SingularPencilError, UncertainRankError
+        What `exact_reduction` refuses.
+
+    Examples
+    --------
+    Two free masses joined by a spring:
+
+    >>> poles = model_poles(mechss([[2, 0], [0, 2]], None, [[9, -9], [-9, 9]]))
+    >>> int(np.count_nonzero(poles == 0.0)), float(np.abs(poles).max().round(12))
+    (2, 3.0)
+    """
+    A = working_matrix(model)
+    return np.asarray(scipy.linalg.eigvals(A), dtype=np.complex128) if A.size else np.zeros(0, dtype=np.complex128)
+
+
+def working_system(model: SecondOrderModel) -> control.StateSpace:
+    """Return the state space in energy coordinates where the model has them, else in DOF states.
+
+    Raises
+    ------
+    ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
+        The model has no state space (see `mech2ss`).
+    """
+    sys = mech2ss(model)
+    form = working_form(model, sys.nstates)
+    return sys if form is None else energy_state_space(form)
+
+
+def response_of_form(
+    form: EnergyForm, dofs: tuple[FloatArray, FloatArray, FloatArray, FloatArray], points: ComplexArray
+) -> ComplexArray:
+    """Evaluate a model in energy coordinates and in DOF states, and keep the better where they differ.
+
+    Which is better tell refined solves of the descriptor form at a few of the points where they differ, and those
+    values are taken themselves. A large model stays in energy coordinates if they are right wherever it is tested.
+
+    Parameters
+    ----------
+    form : EnergyForm
+        Of a proper model with N states, m inputs and p outputs.
+    dofs : (N, N), (N, m), (p, N), (p, m) ndarrays
+        A, B, C, D of the same model in DOF states.
+    points : (k,) complex ndarray
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+    """
+    output = form.output
+    values = state_space_response(form.A, form.B, output.X, output.direct(form.B.shape[1]), points)
+    if len(form.A) > FEW_STATES and _is_sound(form.model, values, points):
+        return values
+    others = state_space_response(*dofs, points)
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(values - others)
+        doubt = np.isfinite(apart) & (apart > AGREEMENT * np.abs(others))
+    doubtful = np.flatnonzero(doubt.any(axis=(0, 1)))
+    if doubtful.size == 0:
+        return values
+    tested = doubtful[_spread(doubtful.size)]
+    exact = refined_response(form.model, points[tested])
+    nearest = np.abs(np.arange(points.size)[:, None] - tested).argmin(axis=1)
+    worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
+    values = np.where(doubt & worse[:, :, nearest], others, values)
+    values[:, :, tested] = np.where(doubt[:, :, tested] & np.isfinite(exact), exact, values[:, :, tested])
+    return values
+
+
+def _is_sound(model: SecondOrderModel, values: ComplexArray, points: ComplexArray) -> bool:
+    """Return whether energy coordinates are right at some points, the smallest and the largest values among them."""
+    size = np.abs(values).reshape(-1, points.size)
+    with np.errstate(invalid="ignore"):
+        extremes = [int(np.nanargmin(size.min(axis=0))), int(np.argmax(np.nan_to_num(size, posinf=0.0).max(axis=0)))]
+    tested = np.unique(np.append(_spread(points.size), extremes))
+    exact = refined_response(model, points[tested])
+    known = np.isfinite(exact) & np.isfinite(values[:, :, tested])
+    return bool((np.abs(values[:, :, tested] - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
+
+
+def _spread(count: int) -> IndexArray:
+    """Return a few places of a list, its ends among them."""
+    return np.unique(np.rint(np.linspace(0, count - 1, min(count, MOST_TESTED))).astype(np.intp))
+
+
+def refined_response(model: SecondOrderModel, points: ComplexArray) -> ComplexArray:
+    """Evaluate the descriptor form of a dense model by solves that are refined as far as they go.
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+        NaN where P(s) is singular.
+
+    Examples
+    --------
+    >>> refined_response(mechss([[0]], [[0]], [[4]]), np.array([1j])).ravel().tolist()
+    [(0.25+0j)]
+    """
+    exact = ExactPolynomial([model.K, model.C, model.M])
+    shape = (len(model.outputs), len(model.inputs), points.size)
+    values = np.full(shape, complex(np.nan, np.nan))
+    for k, s in enumerate(points.tolist()):
+        P = model.K + s * model.C + s**2 * model.M
+        rows = powers_of_two(np.abs(P).max(axis=1))
+        columns = powers_of_two(np.abs(rows[:, None] * P).max(axis=0))
+        factors, pivots, failed = zgetrf(rows[:, None] * P * columns)
+        if failed:
+            continue
+        right = model.B + s * model.Bv + s**2 * model.Ba + 0j
+        solve = partial(_scaled_solve, factors, pivots, rows, columns)
+        motion = refined(exact, s, solve(right), right, solve)
+        outputs = (model.F + s * model.G + s**2 * model.H) @ motion
+        values[:, :, k] = outputs + model.D + s * model.Dv + s**2 * model.Da
+    return values
+
+
+def _scaled_solve(
+    factors: ComplexArray, pivots: IndexArray, rows: FloatArray, columns: FloatArray, right: ComplexArray
+) -> ComplexArray:
+    """Solve with factors of a matrix whose rows and columns were scaled."""
+    solution, _ = zgetrs(factors, pivots, rows[:, None] * right)
+    return np.asarray(columns[:, None] * solution)
+
+
+def _is_large(model: SecondOrderModel) -> bool:
+    return max(map(len, (model.dofs, model.inputs, model.outputs))) > LARGEST_DENSE_COPY

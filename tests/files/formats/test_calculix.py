@@ -1,0 +1,61 @@
+"""Claims about CalculiX: the upper triangle, names from .dof, and frequencies as its own."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+
+from halfdof_ctrl import load_model
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
+from halfdof_ctrl.files.formats.calculix import read_calculix, read_dofs
+
+K = np.array([[4.0, -1.0, 0.0], [-1.0, 3.0, -0.5], [0.0, -0.5, 2.0]])
+STI = b"1 1  4.0e+00\n1 2 -1.0e+00\n2 2  3.0e+00\n1 3  0.0e+00\n2 3 -5.0e-01\n3 3  2.0e+00\n"
+MAS = b"1 1  1.0e+00\n2 2  1.0e+00\n"  # the last DOF has no mass, and no line
+DOF = b"5.1\n5.3\n60.2\n"
+EXPORT = Path(__file__).parents[4] / "shared" / "exports" / "calculix"
+
+
+@pytest.mark.parametrize("given", ["job.sti", "job.mas", "job.dof", "."])
+def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
+    """From any of them, or the folder; rows without an entry at the end are there."""
+    for name, content in (("job.sti", STI), ("job.mas", MAS), ("job.dof", DOF), ("other.sti.bak", b"")):
+        (tmp_path / name).write_bytes(content)
+    with pytest.warns(ImportedModelWarning, match="no damping C"):
+        model = load_model(tmp_path / given)
+    assert model.dofs == ("n5_u1", "n5_u3", "n60_u2")
+    np.testing.assert_array_equal(model.K.toarray(), K)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(model.M.toarray(), np.diag([1.0, 1.0, 0.0]))  # type: ignore[union-attr]
+
+
+@pytest.mark.skipif(not EXPORT.exists(), reason="no exported files here")
+def test_a_beam_has_the_frequencies_that_calculix_found() -> None:
+    """105.425, 665.943, 1891.57 Hz, each twice; six digits are known."""
+    with pytest.warns(ImportedModelWarning, match="no damping C"):
+        model = load_model(EXPORT / "beam.sti")
+    inverse = scipy.linalg.eigh(model.M.toarray(), model.K.toarray(), eigvals_only=True)[::-1][:6]  # type: ignore[union-attr]
+    expected = np.repeat([105.425, 665.943, 1891.57], 2)
+    np.testing.assert_allclose(np.sqrt(1.0 / inverse) / (2.0 * np.pi), expected, rtol=3e-6)
+    assert model.known_to == 5e-14
+
+
+def test_both_triangles_are_taken_as_they_are() -> None:
+    """Nothing is completed that is there."""
+    raw = read_calculix(b"1 1 4.\n1 2 -1.\n2 1 -3.\n2 2 3.\n", ".sti", 9)
+    np.testing.assert_array_equal(raw.matrix.toarray(), [[4.0, -1.0], [-3.0, 3.0]])
+    assert not raw.is_half_stored
+
+
+@pytest.mark.parametrize("content", [b"0 0 4.\n", b"1 20 4.\n", b"", b"1.5 1 4.\n"])
+def test_places_that_are_none_are_refused(content: bytes) -> None:
+    """From zero, too large, none, fractions."""
+    with pytest.raises(FileFormatError, match=r"do not make a matrix|must be whole"):
+        read_calculix(content, ".sti", 9)
+
+
+@pytest.mark.parametrize("content", [b"5.1\n5\n", b"", b"5.1\n-5.2\n"])
+def test_labels_that_are_none_are_refused(content: bytes) -> None:
+    """With the line."""
+    with pytest.raises(FileFormatError, match=r"a node and its DOF"):
+        read_dofs(content)

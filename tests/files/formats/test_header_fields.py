@@ -1,0 +1,171 @@
+"""Claims about header fields that change the meaning of a file: used, or refused, in every format."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from halfdof_ctrl import load_model
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
+from halfdof_ctrl.files.formats.abaqus import read_abaqus
+from halfdof_ctrl.files.formats.dmig import read_dmig
+from halfdof_ctrl.files.formats.matrix_market import read_matrix_market
+from halfdof_ctrl.files.formats.output4 import read_output4
+from halfdof_ctrl.files.formats.text_blocks import fixed_width
+
+MARKET = b"%%MatrixMarket matrix coordinate real symmetric\n2 2 3\n1 1 2.0\n2 1 -1.0\n2 2 3.0\n"
+SYMMETRIC = [[2.0, -1.0], [-1.0, 3.0]]
+
+
+def op4_text(name: str, shape: tuple[int, int], form: int, columns: dict[int, list[float]]) -> str:
+    """Write the columns of a matrix in the dense layout."""
+    rows, count = shape
+    lines = [f"{count:8d}{rows:8d}{form:8d}{2:8d}{name:8s}1P,3E23.16"]
+    for column, values in columns.items():
+        lines += [f"{column:8d}{1:8d}{len(values):8d}", "".join([f"{value:23.16E}" for value in values])]
+    return "\n".join([*lines, f"{count + 1:8d}{1:8d}{1:8d}", f"{1.0:23.16E}"]) + "\n"
+
+
+def op4_binary(name: bytes, word: int, value: float) -> bytes:
+    """Write a matrix of one entry with words of 4 or 8 bytes, whose name fills four characters of each."""
+    integer = {4: "i", 8: "q"}[word]
+
+    def record(data: bytes) -> bytes:
+        return struct.pack("<i", len(data)) + data + struct.pack("<i", len(data))
+
+    halves = b"".join([name[k : k + 4].ljust(4).ljust(word) for k in (0, 4)])
+    head = record(struct.pack(f"<4{integer}", 1, 1, 6, 2) + halves)
+    column = record(struct.pack(f"<3{integer}d", 1, 1, 8 // word, value))
+    return head + column + record(struct.pack(f"<3{integer}d", 2, 1, 8 // word, 1.0))
+
+
+@pytest.mark.parametrize("start", [b" ", b"\t", b"\xef\xbb\xbf", b"\r\n"])
+def test_a_byte_order_mark_or_blanks_before_the_banner_do_not_matter(start: bytes) -> None:
+    """Windows and MUMPS write them."""
+    assert read_matrix_market(start + MARKET).matrix.toarray().tolist() == SYMMETRIC
+
+
+def test_an_identity_of_output4_has_ones() -> None:
+    """Form 8 stores no columns; one that stores others contradicts itself."""
+    (raw,) = read_output4(op4_text("MAA", (2, 2), 8, {}).encode())
+    assert raw.matrix.toarray().tolist() == [[1.0, 0.0], [0.0, 1.0]]
+    with pytest.raises(FileFormatError, match="says that it is an identity"):
+        read_output4(op4_text("MAA", (2, 2), 8, {1: [2.0, 0.0]}).encode())
+
+
+def test_a_diagonal_of_output4_is_one() -> None:
+    """Form 3 as a single column, or whole."""
+    (raw,) = read_output4(op4_text("MAA", (3, 1), 3, {1: [2.0, 0.0, 5.0]}).encode())
+    np.testing.assert_array_equal(raw.matrix.toarray(), np.diag([2.0, 0.0, 5.0]))
+    (raw,) = read_output4(op4_text("MAA", (2, 2), 3, {1: [2.0], 2: [0.0, 5.0]}).encode())
+    np.testing.assert_array_equal(raw.matrix.toarray(), np.diag([2.0, 5.0]))
+
+
+@pytest.mark.parametrize("form", [4, 5, 9, 10, 11, 13, 15, 99])
+def test_factors_of_output4_are_no_stiffness_without_a_word(tmp_path: Path, form: int) -> None:
+    """They would be a triangle that misses its other half."""
+    (tmp_path / "a.op4").write_text(op4_text("KAA", (2, 2), form, {1: [2.0, 1.0], 2: [0.0, 3.0]}))
+    with pytest.warns(ImportedModelWarning, match=f"has the form {form} .*which is no matrix of a model"):
+        load_model(tmp_path / "a.op4", matrices={"M": None, "C": None})
+
+
+@pytest.mark.parametrize("word", [4, 8])
+def test_names_are_read_whole_in_words_of_either_size(word: int) -> None:
+    """Four characters a word, whose rest is blank where words have eight bytes."""
+    for name in (b"KAA", b"STIFFMAT"):
+        (raw,) = read_output4(op4_binary(name, word, 7.0))
+        assert (raw.title, raw.matrix.toarray().tolist()) == (name.decode().lower(), [[7.0]])
+
+
+def test_one_name_twice_is_asked_for_by_number(tmp_path: Path) -> None:
+    """In OUTPUT4 and DMIG; the refusal says how."""
+    text = op4_text("KAA", (1, 1), 6, {1: [4.0]}) + op4_text("KAA", (1, 1), 6, {1: [9.0]})
+    (tmp_path / "a.op4").write_text(text)
+    header = "DMIG    KAAX    0       6       2       0\n"
+    (tmp_path / "b.pch").write_text(
+        "".join([header + f"DMIG    KAAX    1       1               1       1       {v}.\n" for v in (4, 9)])
+    )
+    for path, name in ((tmp_path / "a.op4", "kaa"), (tmp_path / "b.pch", "kaax")):
+        with pytest.raises(FileFormatError, match=rf"{name}#1, .*{name}#2.*matrices=\{{'K': '{name}#2'\}}"):
+            load_model(path)
+        for number, value in ((1, 4.0), (2, 9.0)):
+            model = load_model(path, matrices={"K": f"{name}#{number}", "M": None, "C": None})
+            assert model.K.toarray().tolist() == [[value]]  # type: ignore[union-attr]
+
+
+def test_text_after_an_empty_line_is_not_left_out() -> None:
+    """Half a file is no file."""
+    text = op4_text("KAA", (1, 1), 6, {1: [4.0]})
+    assert len(read_output4((text + "\n\n").encode())) == 1
+    with pytest.raises(FileFormatError, match="an empty line stands between its matrices"):
+        read_output4((text + "\n" + text).encode())
+
+
+def test_dmig_fields_may_be_set_off_by_tabs(tmp_path: Path) -> None:
+    """In hand-made decks."""
+    (tmp_path / "x.bdf").write_text("DMIG\tKAAX\t0\t6\t2\t0\t\t\t1\nDMIG\tKAAX\t1\t1\t\t1\t1\t2.0\n")
+    model = load_model(tmp_path / "x.bdf", matrices={"M": None, "C": None})
+    assert model.K.toarray().tolist() == [[2.0]]  # type: ignore[union-attr]
+
+
+def test_polar_values_of_dmig_are_amplitude_and_phase() -> None:
+    """2 at 90 degrees is 2j."""
+    (raw,) = read_dmig(b"DMIG,KAAX,0,6,3,0,1\nDMIG,KAAX,1,1,,1,1,2.0,90.0\n")
+    np.testing.assert_allclose(raw.matrix.toarray(), [[2.0j]], atol=1e-15)
+
+
+def test_an_unknown_form_of_dmig_is_refused() -> None:
+    """It could mean anything."""
+    with pytest.raises(FileFormatError, match="DMIG entry of 'kaax'"):
+        read_dmig(b"DMIG,KAAX,0,5,2,0\nDMIG,KAAX,1,1,,1,1,2.0\n")
+
+
+def test_includes_are_told(tmp_path: Path) -> None:
+    """They are not followed, whatever they name."""
+    (tmp_path / "x.bdf").write_text("INCLUDE '/etc/passwd'\nDMIG,KAAX,0,6,2,0\nDMIG,KAAX,1,1,,1,1,2.0\n")
+    with pytest.warns(ImportedModelWarning, match="has INCLUDE statements, which are not followed"):
+        load_model(tmp_path / "x.bdf", matrices={"M": None, "C": None})
+
+
+def test_a_scale_factor_of_abaqus_is_applied() -> None:
+    """And told."""
+    raw = read_abaqus(b"*MATRIX INPUT, NAME=K, SCALE FACTOR=2.5\n1,1, 1,1, 4.0\n")
+    assert raw.matrix.toarray().tolist() == [[10.0]]
+    assert raw.notes == ("entries are multiplied by SCALE FACTOR=2.5",)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"*MATRIX INPUT, NAME=K, INPUT=/etc/passwd\n1,1, 1,1, 4.0\n",
+        b"*MATRIX INPUT, NAME=K\n1,1, 1,1, 4.0\n*MATRIX INPUT, NAME=M\n1,1, 1,1, 4.0\n",
+        b"*MATRIX INPUT, NAME=K, SCALE FACTOR=x\n1,1, 1,1, 4.0\n",
+    ],
+)
+def test_other_files_and_several_matrices_in_one_of_abaqus_are_refused(text: bytes) -> None:
+    """No other file is opened, and two matrices are not added up."""
+    with pytest.raises(FileFormatError, match=r"MATRIX INPUT names another file|SCALE FACTOR"):
+        read_abaqus(text)
+
+
+def test_an_unsymmetric_matrix_of_abaqus_is_not_told_that_half_is_missing(tmp_path: Path) -> None:
+    """One-way coupling: the file says TYPE=UNSYMMETRIC."""
+    text = "*MATRIX INPUT, NAME=K, TYPE=UNSYMMETRIC\n1,1, 1,1, 4.0\n2,1, 1,1, -1.0\n2,1, 2,1, 3.0\n"
+    (tmp_path / "K.mtx").write_text(text)
+    model = load_model({"K": tmp_path / "K.mtx"})
+    assert model.K.toarray().tolist() == [[4.0, 0.0], [-1.0, 3.0]]  # type: ignore[union-attr]
+
+
+def test_a_load_of_abaqus_is_b(tmp_path: Path) -> None:
+    """Node, DOF, value, on the DOFs of the stiffness."""
+    (tmp_path / "j_STIF1.mtx").write_text("1,1, 1,1, 4.0\n2,1, 1,1, -1.0\n2,1, 2,1, 3.0\n")
+    (tmp_path / "j_LOAD1.mtx").write_text("*CLOAD\n2,1, 5.0\n")
+    model = load_model({"K": tmp_path / "j_STIF1.mtx", "B": tmp_path / "j_LOAD1.mtx"})
+    assert model.B.toarray().tolist() == [[0.0], [5.0]]  # type: ignore[union-attr]
+
+
+def test_lines_far_shorter_than_their_fields_are_not_filled_up() -> None:
+    """A header with a thousand fields a line must not take a thousand times the file."""
+    with pytest.raises(ValueError, match="far shorter than their fields"):
+        fixed_width([b"1"] * 100_000, 1, 1000, [1000] * 100_000)

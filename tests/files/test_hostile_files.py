@@ -1,0 +1,160 @@
+"""Claims about files that lie: no crash, no foreign file, no allocation out of proportion, no global state touched."""
+
+import io
+import threading
+import tracemalloc
+import warnings
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+import scipy.sparse
+from hypothesis import given
+from hypothesis import strategies as st
+
+from halfdof_ctrl import HalfdofError, inspect_files, load_model
+from halfdof_ctrl.base.errors import FileFormatError
+
+K = np.array([[6.0, -2.0, 0.0], [-2.0, 3.0, -1.0], [0.0, -1.0, 1.0]])
+LARGE = [b"20000000", b"99999999", b"2147483647", b"9223372036854775807", b"-1", b"0", b"1e999", b"nan"]
+MOST_BYTES = 2**25  #: that a file of a few hundred bytes may take; names and sums of a model of 10 000 rows fit
+
+
+def array(**variables: object) -> bytes:
+    """Write an archive."""
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **variables)  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def workspace(version: str, **variables: object) -> bytes:
+    """Write a file of MATLAB."""
+    stream = io.BytesIO()
+    scipy.io.savemat(stream, variables, format=version, do_compression=version == "5")  # type: ignore[arg-type]
+    return stream.getvalue()
+
+
+def npy() -> bytes:
+    """Write an array."""
+    stream = io.BytesIO()
+    np.save(stream, K)
+    return stream.getvalue()
+
+
+SOUND = {
+    "a.npz": array(M=np.eye(3), C=K, K=K),
+    "K.npy": npy(),
+    "a.mat": workspace("5", M=np.eye(3), C=K, K=scipy.sparse.csc_array(K), sys={"K": K}),
+    "4.mat": workspace("4", M=np.eye(3), K=scipy.sparse.csc_array(K)),
+    "K.txt": b"6 -2 0\n-2 3 -1\n0 -1 1.5\n",
+    "K.csv": b",a,b,c\na,6,-2,0\nb,-2,3,-1\nc,0,-1,1.5\n",
+    "K0.txt": b"0 0 6\n1 0 -2\n1 1 3\n2 2 1\n",
+    "k.sti": b"1 1 6.0e+00\n1 2 -2.0e+00\n2 2 3.0e+00\n",
+    "K.mtx": b"%%MatrixMarket matrix coordinate real general\n3 3 3\n1 1 6.\n2 2 3.\n3 3 1.\n",
+    "j_STIF1.mtx": b"1,1, 1,1, 6.0\n2,1, 1,1, -2.0\n2,1, 2,1, 3.0\n",
+    "a.op4": b"       2       2       6       2KAA     1P,3E23.16\n       1       1       1\n 4.0000000000000000E+00\n"
+    b"       3       1       1\n 1.0000000000000000E+00\n",
+    "a.pch": b"DMIG    KAAX    0       6       2       0\nDMIG    KAAX    1       1               1       1       4.\n",
+}
+
+
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.base.errors.ImportedModelWarning")
+@pytest.mark.parametrize("name", SOUND)
+@given(data=st.data())
+def test_a_damaged_file_is_read_or_refused_by_its_name(
+    name: str, tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    """Cut, changed, or with a huge number in its header: nothing but HalfdofError, in little memory."""
+    content = bytearray(SOUND[name])
+    place = data.draw(st.integers(0, len(content) - 1))
+    kind = data.draw(st.sampled_from(["cut", "byte", "number", "doubled"]))
+    if kind == "cut":
+        content = content[:place]
+    elif kind == "byte":
+        content[place] = data.draw(st.integers(0, 255))
+    elif kind == "number":
+        content[place : place + 1] = data.draw(st.sampled_from(LARGE))
+    else:
+        content[place:place] = content[place : place + 40]
+    path = tmp_path_factory.mktemp("hostile", numbered=True) / name
+    path.write_bytes(content)
+    tracemalloc.start()
+    try:
+        for door in (load_model, inspect_files):
+            try:
+                repr(door(path))
+            except HalfdofError as refusal:
+                assert str(path) in str(refusal)  # noqa: PT017
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+        path.unlink()
+    assert peak < MOST_BYTES
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("K.mtx", b"%%MatrixMarket matrix coordinate real general\n20000000 20000000 1\n1 1 1.0\n"),
+        ("a.op4", b"20000000200000000       6       2KAA     1P,3E23.16\n"),
+        ("K.txt", b"1 1 1.5\n19999999 19999999 1.5\n"),
+        ("k.sti", b"1 1 1.5\n19999999 19999999 1.5\n"),
+    ],
+)
+def test_a_small_file_takes_little_memory(tmp_path: Path, name: str, content: bytes) -> None:
+    """Whatever number of rows it says it has."""
+    (tmp_path / name).write_bytes(content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match=name):
+            load_model(tmp_path / name)
+        assert tracemalloc.get_traced_memory()[1] < 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_a_packed_file_is_not_unpacked_out_of_proportion(tmp_path: Path) -> None:
+    """A hundred megabytes of zeros in a hundred kilobytes; save(sparse) is the way."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", zipfile.ZIP_DEFLATED) as archive:
+        head = (
+            b"\x93NUMPY\x01\x00v\x00{'descr': '<f8', 'fortran_order': False, 'shape': (4000, 4000), }".ljust(127)
+            + b"\n"
+        )
+        archive.writestr("K.npy", head + bytes(8 * 4000**2))
+    with pytest.raises(FileFormatError, match=r"more than are unpacked from .* save it sparse"):
+        load_model(tmp_path / "a.npz")
+
+
+def test_links_out_of_a_matlab_file_are_not_followed(tmp_path: Path) -> None:
+    """HDF5 can name any file."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "secret.mat", "w") as file:
+        file["K"] = K
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file["K"] = h5py.ExternalLink(str(tmp_path / "secret.mat"), "/K")
+        file["L"] = h5py.SoftLink("/K")
+    with pytest.raises(FileFormatError, match="nothing says which matrix is M, C or K"):
+        load_model(tmp_path / "a.mat")
+
+
+def test_loading_in_threads_leaves_the_filters_of_warnings_alone(tmp_path: Path) -> None:
+    """They belong to the whole process."""
+    for name, content in SOUND.items():
+        (tmp_path / name).write_bytes(content)
+    paths = [tmp_path / name for name in ("K.mtx", "K.txt", "a.npz", "a.mat", "a.pch", "K.npy")]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        before = list(warnings.filters)
+
+        def load() -> None:
+            for path in paths * 5:
+                load_model({"K": path})
+
+        threads = [threading.Thread(target=load) for _ in range(8)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert list(warnings.filters) == before

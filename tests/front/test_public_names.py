@@ -1,0 +1,44 @@
+"""What a user sees of the package: the public names, each the thing it says, none hidden by a room."""
+
+import pkgutil
+from types import ModuleType
+
+import pytest
+
+import halfdof_ctrl as hd
+
+
+def test_dir_shows_the_public_names() -> None:
+    """Neither rooms nor what the package imports; completion in a notebook asks for this."""
+    assert dir(hd) == sorted([*hd.__all__, "__version__", "errors"])
+
+
+@pytest.mark.parametrize("name", hd.__all__)
+def test_no_public_name_is_a_module(name: str) -> None:
+    """A function whose name is that of a room or file beside it would be lost by importing that."""
+    assert not isinstance(getattr(hd, name), ModuleType)
+    assert name not in {module.name for module in pkgutil.iter_modules(hd.__path__)}
+
+
+@pytest.mark.parametrize("name", hd.errors.__all__)
+def test_errors_name_the_path_at_which_they_are_documented(name: str) -> None:
+    """`hd.errors` is there without an import of its own, and a traceback shows a name that can be imported."""
+    assert getattr(hd.errors, name).__module__ == "halfdof_ctrl.errors"
+
+
+def test_rooms_are_found_by_their_names() -> None:
+    """No room of the package is shadowed by something that it or a room above hands on."""
+    hidden = [
+        module.name
+        for module in pkgutil.walk_packages(hd.__path__, "halfdof_ctrl.")
+        if not isinstance(_attribute(module.name), ModuleType)
+    ]
+    assert not hidden
+
+
+def _attribute(name: str) -> object:
+    found: object = hd
+    __import__(name)
+    for part in name.split(".")[1:]:
+        found = getattr(found, part)
+    return found

@@ -1,0 +1,1 @@
+"""What tests share: exact arithmetic, drawn models, files written by hand, judgement."""

@@ -1,0 +1,120 @@
+"""The phase from poles and zeros: right on any grid, the same in plots and tables."""
+
+import csv
+from pathlib import Path
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from halfdof_ctrl import (
+    SecondOrderModel,
+    bode_plot,
+    dynamic_stiffness_response,
+    frequency_response,
+    hydromount,
+    mech2ss,
+    mechss,
+    save_response,
+    transmissibility_response,
+)
+from halfdof_ctrl.systems import phase
+from halfdof_ctrl.systems.phase import response_phase
+from support.structures import Structure, damped_structures
+
+DEGREES = 1e-6  # of exact multiples of 90
+
+
+def chain(masses: int, damping: float = 0.0) -> SecondOrderModel:
+    """Give masses of 1 kg on springs of 1 N/m, both ends held."""
+    K = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
+    return mechss(np.eye(masses), damping * np.eye(masses), K)
+
+
+def degrees(data: control.FrequencyResponseData) -> np.ndarray:
+    """Give the phase of the first channel."""
+    return np.degrees(response_phase(data))[0, 0]
+
+
+@given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=8, unique=True), st.integers(0, 5))
+def test_an_undamped_collocated_receptance_stays_between_0_and_minus_180(omega: list[float], place: int) -> None:
+    """Resonances and antiresonances alternate, so the phase is 0 or -180 on any grid, of any few points."""
+    model = chain(6).select(f"F_q{place}", f"q{place}")
+    found = degrees(frequency_response(model, np.sort(omega)))
+    known = np.isfinite(found)
+    assert (np.abs(found[known] + 90.0) <= 90.0 + DEGREES).all()
+    assert_allclose(np.abs(found[known] + 90.0), 90.0, rtol=DEGREES)
+
+
+def test_end_to_end_each_resonance_takes_180_degrees() -> None:
+    """Six poles and no zero: -1080 degrees beyond all of them, from two points."""
+    model = chain(6).select("F_q0", "q5")
+    assert_allclose(degrees(frequency_response(model, [0.01, 100.0])), [0.0, -1080.0], atol=DEGREES)
+    assert_allclose(degrees(frequency_response(mech2ss(model), [0.01, 100.0])), [0.0, -1080.0], atol=DEGREES)
+
+
+@given(structure=damped_structures(), seed=st.integers(0, 2**32 - 1))
+def test_a_coarse_grid_has_the_phase_of_a_fine_one(structure: Structure, seed: int) -> None:
+    """Six random frequencies beside the default grid: the same branch with it and without it."""
+    generator = np.random.default_rng(seed)
+    model = structure.model()
+    model = model.select(model.inputs[generator.integers(len(model.inputs))], model.dofs[0])
+    grid = np.asarray(frequency_response(model).omega)
+    few = np.sort(generator.choice(grid, 6, replace=False))
+    fine, coarse = degrees(frequency_response(model, grid)), degrees(frequency_response(model, few))
+    assert_allclose(coarse, fine[np.searchsorted(grid, few)], atol=1e-3)
+
+
+def test_half_circles_agree_with_poles_and_zeros() -> None:
+    """The way through the right half plane, which knows of no zero, gives the same phase of a transfer receptance."""
+    model = chain(5, 0.05).select("F_q0", "q3")
+    data = frequency_response(model, [0.1, 0.9, 1.3, 1.9, 7.0])
+    source = getattr(data, phase.SOURCE)
+    arguments = (source, source.poles(), (0, 0), np.asarray(data.omega), np.asarray(data.frdata)[0, 0])
+    by_roots, by_circles = phase._by_roots(*arguments), phase._along_half_circles(*arguments)
+    assert by_roots is not None
+    assert by_circles is not None
+    assert_allclose(by_circles, by_roots, atol=1e-9)
+
+
+def test_wrong_zeros_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without its zeros the phase of a receptance disagrees with its values, and half circles take over."""
+    model = chain(5, 0.05).select("F_q0", "q1")
+    data = frequency_response(model, np.geomspace(0.1, 10.0, 15))
+    desired = degrees(data)
+    monkeypatch.setattr(phase, "descriptor_zeros", lambda *_: np.zeros(0, dtype=complex))
+    assert_allclose(degrees(data), desired, atol=1e-9)
+
+
+def test_stiffness_and_transmissibility_are_on_their_branch() -> None:
+    """Three masses: a driving point stiffness rises from 0 to 180, what arrives two masses on falls to -360."""
+    model = chain(3)
+    omega = [0.01, 1.2, 100.0]
+    assert_allclose(degrees(dynamic_stiffness_response(model, "q0", omega))[[0, -1]], [0.0, 180.0], atol=DEGREES)
+    for kind in ("motion", "force"):
+        data = transmissibility_response(model, "q0", "q2", omega, kind=kind)  # type: ignore[arg-type]
+        assert_allclose(degrees(data)[[0, -1]], [0.0, -360.0], atol=DEGREES)
+
+
+@pytest.mark.parametrize("omega", [[5.0, 20.0, 50.0], np.geomspace(0.1, 100.0, 300)])
+def test_plot_and_table_say_the_same(omega: list[float], tmp_path: Path) -> None:
+    """The last column of a table is the lower curve of the plot."""
+    for model in (mechss([[1.0]], None, [[100.0]]), hydromount().select("F_y", "y_ddot")):
+        path = tmp_path / "response.csv"
+        save_response(frequency_response(model, omega), path)
+        with path.open() as stream:
+            table = [float(row[-1]) for row in list(csv.reader(stream))[1:]]
+        cplt = bode_plot(model, omega)
+        assert_allclose(table, cplt.lines[1, 0][0].get_ydata(), atol=DEGREES)
+        plt.close(cplt.figure)
+
+
+def test_a_negative_gain_starts_at_minus_180() -> None:
+    """A spring that pulls the wrong way; an integrator twice starts there too."""
+    lag = control.ss([[-1.0]], [[1.0]], [[-2.0]], [[0.0]])
+    assert_allclose(degrees(frequency_response(lag, [1e-3]))[0], -180.0, atol=0.1)
+    assert_allclose(degrees(frequency_response(mechss([[1.0]], None, None), [1e-3, 1.0])), -180.0, atol=DEGREES)

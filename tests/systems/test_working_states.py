@@ -1,0 +1,55 @@
+"""The states in which responses and poles are computed."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from halfdof_ctrl import exact_reduction, frequency_response, hydromount, mech2ss, mechss
+from halfdof_ctrl.systems.working_states import model_poles, working_map, working_system
+from support.beams import FIRST_MODES, ball_transfer, cantilever
+from support.exact import transfer
+
+EVALUATED = 1e-10  #: relative, on a Hessenberg form in energy coordinates
+AS_GOOD = 1e-12  #: relative: what is below is rounding
+OMEGA = np.append(np.geomspace(0.1, 1e3, 40), 16.57)
+
+
+def test_frequency_response_of_a_beam_keeps_its_digits() -> None:
+    """At the first four resonances of 40 elements, against ball arithmetic: DOF states lose 1e-3 there."""
+    response = frequency_response(cantilever(40), FIRST_MODES).complex
+    assert_allclose(response, ball_transfer(cantilever(40), 1j * np.array(FIRST_MODES)), rtol=EVALUATED)
+
+
+@pytest.mark.parametrize("damping", [1.0, 1e-2, 1e-3, 1e-5, 1e-6])
+def test_frequency_response_is_never_worse_than_python_control(damping: float) -> None:
+    """Weak dampers of a massless node: a pole 1e8 times faster than the mode, of the model and of its state space."""
+    model = hydromount(C_rs=damping).select("F_y", "y")
+    exact = transfer(model, 1j * OMEGA)[0, 0]
+    for what in (model, mech2ss(model)):
+        assert_allclose(frequency_response(what, OMEGA).complex, exact, rtol=AS_GOOD)
+
+
+def test_deep_roll_off_comes_of_dof_states() -> None:
+    """The far end of a chain of 12 masses at 100 times its frequencies: 1e-48 of the near end, to ten digits."""
+    n = 12
+    K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    model = mechss(np.eye(n), 0.1 * np.eye(n), K).select("F_q0", f"q{n - 1}")
+    exact = transfer(model, [100.0j])[0, 0]
+    assert_allclose(frequency_response(model, [100.0]).complex, exact, rtol=EVALUATED)
+
+
+def test_poles_of_free_motions_are_exactly_zero() -> None:
+    """Two masses and a node between them: a double pole at 0 and one pair at 10 rad/s."""
+    poles = model_poles(mechss(np.diag([2.0, 0, 1]), None, [[100, -100, 0], [-100, 300, -200], [0, -200, 200]]))
+    assert np.count_nonzero(poles == 0.0) == 2
+    assert_allclose(np.abs(poles[poles != 0.0]), 10.0, rtol=AS_GOOD)
+
+
+def test_working_states_are_energy_where_the_model_allows_it() -> None:
+    """The mount in energy, a follower force in scaled DOF states, a model without states in none."""
+    follower = mechss(np.eye(2), None, [[2, 1], [-1, 2]])
+    chosen = [working_map(exact_reduction(model)) for model in (hydromount(), follower)]
+    assert [states.kind for states in chosen if states is not None] == ["energy", "scaled"]
+    assert working_map(exact_reduction(mechss(None, None, [[1]]))) is None
+    assert working_system(hydromount()).state_labels[0] == "strain_y"
+    assert working_system(follower).state_labels == list(exact_reduction(follower).states)
