@@ -11,6 +11,7 @@ from halfdof_ctrl.base.errors import (
     AssemblyError,
     CloseDecisionWarning,
     ComplexModelError,
+    EnergyFormError,
     FileFormatError,
     HalfdofError,
     ImproperError,
@@ -52,6 +53,7 @@ EXAMPLES: list[HalfdofError] = [
     FileFormatError("truncated", path="model.mtx", line=3),
     MissingExtraError("needs h5py", path="model.mat", extra="hdf5"),
     WorkerError("cannot start", function="hydromount"),
+    EnergyFormError("no energy coordinates", reason="unsymmetric", dofs=("a",)),
     ModelSizeError("too many states", size=400_000, limit=8192),
 ]
 

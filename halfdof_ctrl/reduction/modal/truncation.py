@@ -165,6 +165,8 @@ def truncate_modes(
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
     band = (top / 10.0**DECADES, top)
+    if LOST in parts:  # the poles are those of the whole stiffness
+        parts = {letter: part for letter, part in parts.items() if letter != LOST} | {"K": as_sparse(model.K)}
     resonances = resonance_errors(parts, small, basis, band)
     return _measured(model, small, motions, resonances, (band, points))
 
