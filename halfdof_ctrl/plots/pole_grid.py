@@ -62,8 +62,9 @@ def _is_squeezed(points: npt.NDArray[np.complexfloating]) -> bool:
 
 def draw_pole_grid(ax: Axes) -> None:
     """Draw and label lines of equal damping ratio and of equal natural frequency within the limits."""
-    reach = float(np.hypot(max(np.abs(ax.get_xlim())), max(np.abs(ax.get_ylim()))))
-    radii = np.geomspace(1e-12 * reach, reach, 900)
+    across, up = max(np.abs(ax.get_xlim())), max(np.abs(ax.get_ylim()))
+    reach = float(np.hypot(across, up))
+    radii = np.geomspace(min(1e-12 * reach, 1e-3 * across, 1e-3 * up), reach, 900)  # a fast real pole leaves `up` small
     last = _axes_coordinates(ax, 1j * radii)[_inside(ax, 1j * radii)][-1]
     for zeta in DAMPING_RATIOS:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
