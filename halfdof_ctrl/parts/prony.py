@@ -112,7 +112,7 @@ def fit_prony(
     branches : int, optional
         Number of springs and dampers in series; by default the number that Akaike's criterion chooses, up to 12.
     weight : {"relative", "absolute", "parts"}
-        What is minimised: errors over |K| (default), errors as they are, or errors of K' over K' and of K'' over K''.
+        What is minimised: errors over the modulus (default), errors as they are, or errors of K' over K' and of K'' over K''.
     static_stiffness : float, optional
         Stiffness at rest [N/m], from a static test; by default it is found from the curve.
 
