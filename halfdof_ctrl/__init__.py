@@ -1,6 +1,6 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
-from halfdof_ctrl import laws
+from halfdof_ctrl import laws as laws  # `hd.laws`, a module and so no public name of its own
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -103,7 +103,6 @@ __all__ = [
     "initial_response",
     "inspect_files",
     "kelvin_voigt",
-    "laws",
     "load_model",
     "load_response",
     "load_system",
@@ -142,4 +141,4 @@ __all__ = [
 
 def __dir__() -> list[str]:
     """Show the public names alone; the rooms of the package can still be imported."""
-    return [*__all__, "__version__", "errors"]
+    return [*__all__, "__version__", "errors", "laws"]

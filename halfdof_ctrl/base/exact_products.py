@@ -16,12 +16,10 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.double_double import BITS, SPLITTER
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, is_sparse
 
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
-
-BITS = 53  #: of a double
-SPLITTER = 2.0**27 + 1.0  #: Dekker's: cuts 53 bits in halves
 
 
 @dataclass(frozen=True, slots=True, eq=False)

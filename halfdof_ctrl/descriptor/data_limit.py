@@ -16,7 +16,7 @@ from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 WARNED = 1e-6  #: part of the value from which (DATA) is told
-SMALL_SHIFT = 1e-9  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
+SMALL_SHIFT = 1e-8  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
 
 
 def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -> ComplexArray:

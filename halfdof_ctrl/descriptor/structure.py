@@ -1,10 +1,7 @@
 """The oracle: what the descriptor form itself says, by routes that the reduction does not take.
 
 Counts are exact (`exact_counts`), eigenvalues carry bounds (`finite_spectrum`), and what rounding left open is said
-(`found_structure`). Zeros are the finite eigenvalues of the system pencil
-
-    [ P(s)  -B(s) ]
-    [ F(s)   D(s) ]                                                                        (9)
+(`found_structure`).
 """
 
 from dataclasses import dataclass, field
@@ -90,6 +87,31 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     Where numbers were rounded before they were stored, by a change of coordinates or to decimals, they may have
     eigenvalues that nobody meant. Those that are told from rounding are given, `most_finite` is what the stored numbers
     have, and `uncertainty` says what is in doubt.
+
+    The pencil (8) of dimension n + rank M has ``n + rank M - k`` eigenvalues at infinity beside the k finite ones, in
+    Jordan blocks whose sizes are `infinite_blocks`: a block of size 1 is an algebraic equation that holds at once (a
+    static DOF), one of size 2 takes a derivative (a velocity constraint with its multiplier), one of size 3 two (a
+    position constraint). In the companion form of dimension 2n each of the ``n - rank M`` directions without mass has a
+    block larger by one, of size 1 for a half DOF, which makes `n_infinite` in all. A block of size k stands for a
+    degree 1 - k of P(s) in its Smith-McMillan form at infinity: some entry of its inverse grows as s^(k - 1).
+
+    Examples
+    --------
+    A damper of 5 N s/m against a spring of 10 N/m, no mass:
+
+    >>> structure = pencil_structure(mechss([[0]], [[5]], [[10]]))
+    >>> structure.finite_eigenvalues.real.round(12).tolist(), structure.n_infinite
+    ([-2.0], 1)
+
+    Two masses tied by a rigid link, whose force is the multiplier q2; a prescribed change of its length takes
+    forces that grow as s^2:
+
+    >>> tied = mechss([[1, 0, 0], [0, 1, 0], [0, 0, 0]], None, [[2, 0, 1], [0, 3, -1], [1, -1, 0]])
+    >>> structure = pencil_structure(tied)
+    >>> structure.infinite_blocks, structure.index, structure.is_proper
+    ((3,), 3, False)
+    >>> structure.improper_pairs
+    (('F_q2', 'q2', 2),)
     """
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
     found = found_structure((model.K, model.C, model.M))

@@ -42,7 +42,7 @@ DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-orde
 MARGIN = 4.0  #: times its bound: a closed-loop pole nearer to the axis is not told from one on it
 GOOD = 1e-9  #: estimated error with which no other states are tried
 MANY = 24  #: states from which on energy coordinates are tried first: these are structures, whose DOFs lose digits
-WORTH = 0.1  #: of the estimated error: other states that leave more are not worth their way back to DOFs
+WORTH = 0.01  #: of the estimated error: other states that leave more are not worth their way back to DOFs
 WARNED, REFUSED = 1e-8, 1e-6  #: estimated errors of a gain that are said, and that are too much
 
 
@@ -114,7 +114,10 @@ class StateFeedback:
         for name, row in zip(self.inputs, self.K, strict=True):
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
         poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
-        return "\n".join([*lines, f"  closed-loop poles: {poles}"])
+        lines.append(f"  closed-loop poles: {poles}")
+        if self.gain_error > WARNED:
+            lines.append(f"  gain known to {self.gain_error:.0e} of its size")
+        return "\n".join(lines)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

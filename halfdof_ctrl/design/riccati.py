@@ -34,6 +34,7 @@ UNIT = float(np.finfo(float).eps) / 2.0
 SETTLED = 1e-15  #: a step that changes the gain by less is the last one
 MOST_STEPS = 100  #: each at least halves the distance, from however far
 FROM_AFAR = 0.3  #: relative steps above this one are not yet those of fast convergence, and may stagnate
+REFINEMENTS = 1  #: of the solution for a random rounding
 SAMPLES = 3  #: random roundings
 CAUTION = 3.0  #: times the last step and the largest sample: the error that is stated; true errors reach 1.3 of it
 GAP = 1e3  #: ratio of neighbouring eigenvalues at which fast and slow parts are told apart
@@ -161,7 +162,9 @@ def _starts(problem: CareProblem, method: Solver) -> Iterator[tuple[FloatArray |
 def _solution(problem: CareProblem, method: Solver) -> FloatArray | None:
     """Ask a solver; None where it finds nothing or is not there."""
     try:
-        found = control.lqr(problem.A, problem.B, problem.Q, problem.R, problem.N, method=method)[1]
+        found = control.lqr(problem.A, problem.B, (problem.Q + problem.Q.T) / 2.0, problem.R, problem.N, method=method)[
+            1
+        ]
     except (ArithmeticError, ValueError, ImportError, Warning):  # what the solvers raise; slycot warns, as an error
         return None
     X = np.asarray(found, dtype=float)
@@ -242,6 +245,7 @@ class _Lyapunov:
     """``F^T Y + Y F = -S`` for one F and several S, by one real Schur form (R. H. Bartels and G. W. Stewart, 1972)."""
 
     def __init__(self, F: FloatArray) -> None:
+        self.F = F
         self.T, self.U = scipy.linalg.schur(F, output="real")
 
     def solved(self, S: FloatArray) -> FloatArray:
@@ -249,6 +253,15 @@ class _Lyapunov:
         Y, scale, _ = dtrsyl(self.T, self.T, right, trana="T", tranb="N")
         solution = self.U @ (Y / scale) @ self.U.T
         return np.asarray((solution + solution.T) / 2.0)
+
+    def refined(self, S: FloatArray) -> FloatArray:
+        """Solve with residuals in twice the working precision: fast and slow eigenvalues together lose all digits."""
+        solution: Double2 = self.solved(S), np.zeros_like(S)
+        for _ in range(REFINEMENTS):
+            motion = _plus(matrix_product(solution[0], self.F), solution[1] @ self.F)
+            total = added(added(motion, (motion[0].T, motion[1].T)), (S, np.zeros_like(S)))
+            solution = two_sum(solution[0], solution[1] + self.solved(total[0] + total[1]))
+        return np.asarray(solution[0] + solution[1])
 
 
 def _sample(problem: CareProblem, X: FloatArray, gain: FloatArray, lyapunov: _Lyapunov, seed: int) -> float:
@@ -261,7 +274,7 @@ def _sample(problem: CareProblem, X: FloatArray, gain: FloatArray, lyapunov: _Ly
     dA = rounded(np.abs(problem.A) + 2.0 * np.abs(problem.B) @ np.abs(problem.N.T))
     dB, dN, dQ = rounded(np.abs(problem.B)), rounded(np.abs(problem.N)), rounded(np.abs(problem.Q))
     change = X @ dA - (X @ dB + dN) @ gain
-    step = lyapunov.solved((dQ + dQ.T) / 2.0 + change + change.T)
+    step = lyapunov.refined((dQ + dQ.T) / 2.0 + change + change.T)
     return _relative(problem.B.T @ step + dB.T @ X + dN.T, gain)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
-from halfdof_ctrl.files.folders import all_files
+from halfdof_ctrl.files.folders import LABEL_ENDINGS, all_files
 from halfdof_ctrl.files.foreign import OCTAVE, foreign_kind
 from halfdof_ctrl.files.formats import abaqus, calculix, dmig, harwell_boeing, matrix_market, output4, table
 from halfdof_ctrl.files.formats.npy import is_npy, is_npz
@@ -25,7 +25,6 @@ from halfdof_ctrl.files.workspace import SIGNALS, Workspace, listing, read_works
 
 NO_LAST_LINE_END = "does not end with a line end: its last number may be cut short"
 FEM_MATRICES = ("M", "C", "K", "S")  #: S: structural damping, the imaginary part of K
-LABEL_ENDINGS = (".mapping", ".dof")
 Titles = Mapping[str, str | None]
 
 

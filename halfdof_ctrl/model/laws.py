@@ -22,6 +22,24 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.law import EVERYWHERE, Law
+from halfdof_ctrl.model.law_functions import (
+    bilinear_force,
+    bilinear_slope,
+    coulomb_force,
+    coulomb_inverse,
+    coulomb_slope,
+    cubic_force,
+    cubic_inverse,
+    cubic_slope,
+    gap_force,
+    gap_slope,
+    power_force,
+    power_inverse,
+    power_slope,
+    quadratic_force,
+    quadratic_inverse,
+    quadratic_slope,
+)
 from halfdof_ctrl.model.measured_curve import MeasuredCurve
 
 __all__ = ["bilinear", "coulomb", "cubic", "gap", "power", "quadratic", "table"]
@@ -56,9 +74,9 @@ def quadratic(c2: float, c1: float = 0.0) -> Law:
     rises = a >= 0.0 and b >= 0.0
     onto = rises and (a > 0.0 or b > 0.0)
     return Law(
-        partial(_quadratic_force, a, b),
-        partial(_quadratic_slope, a, b),
-        partial(_quadratic_inverse, a, b) if onto else None,
+        partial(quadratic_force, a, b),
+        partial(quadratic_slope, a, b),
+        partial(quadratic_inverse, a, b) if onto else None,
         bounds=_grown(a or b),
         monotone=rises,
         written=_written(quadratic, c2, c1),
@@ -92,9 +110,9 @@ def power(c: float, exponent: float) -> Law:
         msg = f"power: exponent = {exponent}, but it must be positive, or the force at rest would jump or be infinite."
         raise ParameterError(msg, parameter="exponent", value=exponent)
     return Law(
-        partial(_power_force, a, p),
-        partial(_power_slope, a, p),
-        partial(_power_inverse, a, p) if a > 0.0 else None,
+        partial(power_force, a, p),
+        partial(power_slope, a, p),
+        partial(power_inverse, a, p) if a > 0.0 else None,
         bounds=_grown(a),
         monotone=a >= 0.0,
         written=_written(power, c, exponent),
@@ -126,9 +144,9 @@ def cubic(k3: float, k1: float = 0.0) -> Law:
     rises = a >= 0.0 and b >= 0.0
     onto = rises and (a > 0.0 or b > 0.0)
     return Law(
-        partial(_cubic_force, a, b),
-        partial(_cubic_slope, a, b),
-        partial(_cubic_inverse, a, b) if onto else None,
+        partial(cubic_force, a, b),
+        partial(cubic_slope, a, b),
+        partial(cubic_inverse, a, b) if onto else None,
         bounds=_grown(a or b),
         monotone=rises,
         written=_written(cubic, k3, k1),
@@ -158,9 +176,9 @@ def bilinear(k_minus: float, k_plus: float) -> Law:
     a, b = _numbers(bilinear, k_minus=k_minus, k_plus=k_plus)
     left, right = (math.copysign(math.inf, -a) if a else 0.0), (math.copysign(math.inf, b) if b else 0.0)
     return Law(
-        partial(_bilinear_force, a, b),
-        partial(_bilinear_slope, a, b),
-        partial(_bilinear_force, 1.0 / a, 1.0 / b) if a > 0.0 and b > 0.0 else None,
+        partial(bilinear_force, a, b),
+        partial(bilinear_slope, a, b),
+        partial(bilinear_force, 1.0 / a, 1.0 / b) if a > 0.0 and b > 0.0 else None,
         bounds=(left, right) if left < right else None,
         monotone=a >= 0.0 and b >= 0.0,
         written=_written(bilinear, k_minus, k_plus),
@@ -203,8 +221,8 @@ def gap(k: float, upper: float, lower: float | None = None) -> Law:
         raise ParameterError(msg, parameter="gap", value=(k, upper, lower))
     left, right = (0.0 if math.isinf(below) or not a else -math.inf), (math.inf if a else 0.0)
     return Law(
-        partial(_gap_force, a, above, below),
-        partial(_gap_slope, a, above, below),
+        partial(gap_force, a, above, below),
+        partial(gap_slope, a, above, below),
         None,
         bounds=(left, right) if left < right else None,
         monotone=True,
@@ -240,9 +258,9 @@ def coulomb(F: float, v0: float, c: float = 0.0) -> Law:
         msg = f"coulomb: v0 = {v0}, but the rate over which friction turns round must be positive. Take a small one."
         raise ParameterError(msg, parameter="v0", value=v0)
     return Law(
-        partial(_coulomb_force, a, width, b),
-        partial(_coulomb_slope, a, width, b),
-        partial(_coulomb_inverse, a, width) if b == 0.0 and a > 0.0 else None,
+        partial(coulomb_force, a, width, b),
+        partial(coulomb_slope, a, width, b),
+        partial(coulomb_inverse, a, width) if b == 0.0 and a > 0.0 else None,
         bounds=_grown(b) if b else (-a, a) if a > 0.0 else None,
         monotone=a >= 0.0 and b >= 0.0,
         written=_written(coulomb, F, v0, c),
@@ -358,96 +376,3 @@ def _bilinear_beside(k_minus: float, k_plus: float, c: float) -> Law:
 
 def _coulomb_beside(F: float, v0: float, viscous: float, c: float) -> Law:
     return coulomb(F, v0, viscous + c)
-
-
-def _quadratic_force(c2: float, c1: float, x: Any) -> Any:  # noqa: ANN401
-    return (c1 + c2 * abs(x)) * x
-
-
-def _quadratic_slope(c2: float, c1: float, x: Any) -> Any:  # noqa: ANN401
-    return c1 + 2.0 * c2 * abs(x)
-
-
-def _quadratic_inverse(c2: float, c1: float, f: Any) -> Any:  # noqa: ANN401
-    """Solve by the root that does not cancel: 2 f / (c1 + √(c1² + 4 c2 |f|))."""
-    if isinstance(f, float):
-        below = c1 + math.sqrt(c1 * c1 + 4.0 * c2 * abs(f))
-        return 2.0 * f / below if below > 0.0 else 0.0
-    below = c1 + np.sqrt(c1 * c1 + 4.0 * c2 * np.abs(f))
-    return np.divide(2.0 * np.asarray(f), below, out=np.zeros(np.shape(f)), where=below > 0.0)
-
-
-def _power_force(c: float, p: float, x: Any) -> Any:  # noqa: ANN401
-    if isinstance(x, float):
-        return c * math.copysign(abs(x) ** p, x)
-    return c * np.copysign(np.abs(x) ** p, x)
-
-
-def _power_slope(c: float, p: float, x: Any) -> Any:  # noqa: ANN401
-    with np.errstate(divide="ignore"):  # of a root at rest, whose slope is infinite
-        steep = np.power(np.abs(np.asarray(x, dtype=float)), p - 1.0)
-    return c * p * steep if c else 0.0 * np.asarray(x, dtype=float)
-
-
-def _power_inverse(c: float, p: float, f: Any) -> Any:  # noqa: ANN401
-    if isinstance(f, float):
-        return math.copysign((abs(f) / c) ** (1.0 / p), f)
-    return np.copysign((np.abs(f) / c) ** (1.0 / p), f)
-
-
-def _cubic_force(k3: float, k1: float, x: Any) -> Any:  # noqa: ANN401
-    return (k1 + k3 * x * x) * x
-
-
-def _cubic_slope(k3: float, k1: float, x: Any) -> Any:  # noqa: ANN401
-    return k1 + 3.0 * k3 * x * x
-
-
-def _cubic_inverse(k3: float, k1: float, f: Any) -> Any:  # noqa: ANN401
-    """Solve by Newton from above, where the cubic is convex: no root formula keeps all digits at both ends."""
-    force = np.abs(np.asarray(f, dtype=float))
-    with np.errstate(divide="ignore", over="ignore"):
-        x = np.minimum(force / k1 if k1 else np.inf, np.cbrt(force / k3) if k3 else np.inf)
-    for _ in range(60):  # at most about 6 are needed from an upper bound that is off by a factor below 1.5
-        slope = k1 + 3.0 * k3 * x * x
-        step = np.divide((k1 + k3 * x * x) * x - force, slope, out=np.zeros_like(x), where=slope > 0.0)
-        x = x - step
-        if (np.abs(step) <= np.finfo(float).eps * np.abs(x)).all():
-            break
-    return np.copysign(x, f)
-
-
-def _bilinear_force(k_minus: float, k_plus: float, x: Any) -> Any:  # noqa: ANN401
-    if isinstance(x, float):
-        return (k_minus if x < 0.0 else k_plus) * x
-    return np.where(np.asarray(x) < 0.0, k_minus, k_plus) * x
-
-
-def _bilinear_slope(k_minus: float, k_plus: float, x: Any) -> Any:  # noqa: ANN401
-    return np.where(np.asarray(x) < 0.0, k_minus, k_plus)
-
-
-def _gap_force(k: float, upper: float, lower: float, x: Any) -> Any:  # noqa: ANN401
-    if isinstance(x, float):
-        return k * (x - upper) if x > upper else k * (x + lower) if x < -lower else 0.0
-    return k * np.maximum(x - upper, 0.0) + k * np.minimum(x + lower, 0.0)
-
-
-def _gap_slope(k: float, upper: float, lower: float, x: Any) -> Any:  # noqa: ANN401
-    x = np.asarray(x)
-    return k * ((x > upper) | (x < -lower))
-
-
-def _coulomb_force(F: float, v0: float, c: float, x: Any) -> Any:  # noqa: ANN401
-    if isinstance(x, float):
-        return F * (x / math.hypot(x, v0)) + c * x
-    return F * (x / np.hypot(x, v0)) + c * x
-
-
-def _coulomb_slope(F: float, v0: float, c: float, x: Any) -> Any:  # noqa: ANN401
-    size = math.hypot(x, v0) if isinstance(x, float) else np.hypot(x, v0)
-    return F * (v0 / size) ** 2 / size + c
-
-
-def _coulomb_inverse(F: float, v0: float, f: Any) -> Any:  # noqa: ANN401
-    return v0 * f / np.sqrt((F - f) * (F + f))

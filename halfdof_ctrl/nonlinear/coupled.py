@@ -19,19 +19,18 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import FloatArray, IndexArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.nonlinear.geometry import Geometry, Place
 from halfdof_ctrl.nonlinear.scalar_equation import root_of
 
-EPS = float(np.finfo(float).eps)
 SYMMETRIC = 1e-11  #: relative difference of S and its transpose that is rounding
 RANK = 1e-12  #: singular values of S below this part of the largest are none
-MOST_STEPS = 100  #: of Newton
-MOST_HALVINGS = 60  #: along one step
+MOST_COUPLED_STEPS = 100  #: of Newton
+MOST_COUPLED_HALVINGS = 60  #: along one step
 MOST_TURNS = 400  #: through all variables, one by one
 LOOSE = 1e3 * EPS  #: of its terms: a gradient that Newton does not make smaller than this is rounding
-SETTLED = 8 * EPS  #: relative change of w that is none
+SETTLED_FORCE = 8 * EPS  #: relative change of w that is none
 SHIFTS = (0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-2, 1.0)  #: of the Hessian, in units of its linear part
 STEEPEST = 1e200  #: stands for an infinite slope
 
@@ -140,7 +139,7 @@ def _newton(h: _Potential, w_0: FloatArray) -> tuple[FloatArray, bool]:
     """Minimize h from y = 0; tell whether it settled."""
     y = np.zeros(h.s.size)
     one, two = h.gradient(w_0, y)
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_COUPLED_STEPS):
         if _is_flat(one, two, EPS):
             return y, True
         down, w = one + two, w_0 + h.V @ y
@@ -176,7 +175,7 @@ def _newton_step(hessian: FloatArray, down: FloatArray, s: FloatArray) -> FloatA
 def _along(h: _Potential, w_0: FloatArray, y: FloatArray, step: FloatArray, first: float) -> FloatArray:
     """Go along a step to where the derivative of h has fallen to less than half; it rises along the step."""
     low, high, at = 0.0, 1.0, 1.0
-    for _ in range(MOST_HALVINGS):
+    for _ in range(MOST_COUPLED_HALVINGS):
         one, two = h.gradient(w_0, y + at * step)
         derivative = float((one + two) @ step)
         if math.isfinite(derivative) and (abs(derivative) <= 0.5 * abs(first) or (derivative < 0.0 and at == 1.0)):
@@ -219,13 +218,13 @@ def _plain_solver(group: Group) -> Solver:
 
     def solve(t: float, w_0: FloatArray) -> tuple[FloatArray, FloatArray] | None:
         w, left = w_0, residual(t, w_0, w_0)
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_COUPLED_STEPS):
             try:
                 step = -np.linalg.solve(unit + group.S @ (group.slope(w, t) - group.G), left)
             except np.linalg.LinAlgError:
                 return None
             at, size = 1.0, float(np.linalg.norm(left))
-            for _ in range(MOST_HALVINGS):
+            for _ in range(MOST_COUPLED_HALVINGS):
                 following = residual(t, w_0, w + at * step)
                 if np.isfinite(following).all() and np.linalg.norm(following) <= (1.0 - 1e-4 * at) * size:
                     break
@@ -242,4 +241,4 @@ def _plain_solver(group: Group) -> Solver:
 
 
 def _is_settled(step: np.ndarray, w: np.ndarray) -> bool:
-    return bool((np.abs(step) <= SETTLED * np.abs(w).max(initial=0.0)).all())
+    return bool((np.abs(step) <= SETTLED_FORCE * np.abs(w).max(initial=0.0)).all())

@@ -19,12 +19,12 @@ from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 if TYPE_CHECKING:
     from halfdof_ctrl.nonlinear.reduction import NonlinearReduction
 
-MOST_STEPS = 200  #: of Newton
+MOST_EQUILIBRIUM_STEPS = 200  #: of Newton
 MOST_HALVINGS = 50  #: of one step
 LOADED = tuple((0.0, part / 16) for part in range(1, 17))  #: (share of a helping spring, of the load): the load grows
 RELEASED = (*((10.0**-power, 1.0) for power in range(9)), (0.0, 1.0))  #: or springs that hold everything are let go
 REST = 1e-12  #: force left over, relative to the largest one, at which it is at rest
-SINGULAR = 1e-13  #: reciprocal condition of the scaled stiffness below which something is loose
+LOOSE_STIFFNESS = 1e-13  #: reciprocal condition of the scaled stiffness below which something is loose
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -96,13 +96,13 @@ def _newton(
 ) -> FloatArray | None:
     """Find q from a first guess; None if a stiffness is singular on the way or the steps do not settle."""
     left = _left_over(reduction, K, load, q)[free]
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_EQUILIBRIUM_STEPS):
         tangent = _stiffness(reduction, K, q)[np.ix_(free, free)]
         size = float(np.abs(load).max(initial=0.0) + (np.abs(tangent) @ np.abs(q[free])).max(initial=0.0))
         if np.abs(left).max(initial=0.0) <= REST * size and not _loose(tangent):
             return q
         try:
-            step = -np.linalg.lstsq(tangent, left, rcond=SINGULAR)[0]
+            step = -np.linalg.lstsq(tangent, left, rcond=LOOSE_STIFFNESS)[0]
         except np.linalg.LinAlgError:
             return None
         at = 1.0
@@ -124,7 +124,7 @@ def _loose(tangent: FloatArray) -> bool:
     size = np.abs(tangent).max(axis=1, initial=0.0)
     if not size.all():
         return bool(size.size)
-    return bool(np.linalg.cond(tangent / size[:, None]) * SINGULAR > 1.0)
+    return bool(np.linalg.cond(tangent / size[:, None]) * LOOSE_STIFFNESS > 1.0)
 
 
 def _no_rest(

@@ -14,7 +14,7 @@ from halfdof_ctrl.model.law import Law
 FAR = (1e100, 1e150)  #: where a law is asked whether it still grows
 STILL = 1e-6  #: relative growth between these two that is none
 GRID = np.concatenate([-np.geomspace(1e12, 1e-9, 253), [0.0], np.geomspace(1e-9, 1e12, 253)])  #: values that are tried
-ROUNDING = 64 * np.finfo(float).eps  #: a fall by this part of the force is rounding
+FORCE_ROUNDING = 64 * np.finfo(float).eps  #: a fall by this part of the force is rounding
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ def judged(law: Law) -> Judgement:
     known = np.isfinite(force)
     x, force = x[known], force[known]
     rise = np.diff(force)
-    noise = ROUNDING * np.maximum(np.abs(force[1:]), np.abs(force[:-1]))
+    noise = FORCE_ROUNDING * np.maximum(np.abs(force[1:]), np.abs(force[:-1]))
     bounds = _reach(law) if law.bounds is None else law.bounds
     unbounded_part = np.abs(force[1:]) < STILL_BELOW * _largest(bounds)  # a law is flat where it has reached its bound
     flat = law.flat or bool(((rise == 0.0) & (np.abs(force[1:]) > 0.0) & unbounded_part).any() or _dead(x, force))

@@ -42,7 +42,7 @@ COARSE = 1e-3  #: relative tolerance of the run that measures the sizes
 SAFETY = 0.03  #: of rtol is what each step may err; over a run errors add up (measured: to 150 times a step's)
 LEAST_STEP_TOLERANCE = 1e-13  #: relative; solvers refuse less
 BAR_STEPS = 1000  #: of the progress bar
-FEWEST_STEPS = 50  #: in a run whose inputs are functions, which may move between the times asked for
+FEWEST_RUN_STEPS = 50  #: in a run whose inputs are functions, which may move between the times asked for
 
 
 def nonlinear_response(
@@ -155,7 +155,7 @@ class _Run:
         span = float(times[-1] - times[0])
         longest = math.inf
         if forcing.samples is None and times.size > 1:
-            longest = min(float(np.diff(times).max()), span / FEWEST_STEPS)
+            longest = min(float(np.diff(times).max()), span / FEWEST_RUN_STEPS)
         return cls(reduction=reduction, rate=rate, times=times, kinks=forcing.kinks, longest=longest)
 
     def integrate(

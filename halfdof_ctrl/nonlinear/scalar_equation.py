@@ -9,11 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.model.law import Law
 
 MOST_DOUBLINGS = 2200  #: from 2^-1074 to 2^1024 and back: every positive double
-MOST_STEPS = 200  #: of Newton or bisection inside the bracket; bisection alone takes 64 for all digits
-EPS = float(np.finfo(float).eps)
+MOST_SCALAR_STEPS = 200  #: of Newton or bisection inside the bracket; bisection alone takes 64 for all digits
 
 Root = Callable[[float], float]
 
@@ -93,7 +93,7 @@ def _newton(residual: Root, slope: Root, near: float, far: float) -> float:
     low, high = (near, far) if residual(near) < 0.0 else (far, near)  # residual(low) < 0 <= residual(high)
     w = 0.5 * (low + high)
     before = abs(high - low)
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_SCALAR_STEPS):
         value = residual(w)
         if value == 0.0:
             return w

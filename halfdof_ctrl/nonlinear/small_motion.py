@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from halfdof_ctrl.nonlinear.reduction import NonlinearReduction
 
 STEEPEST = 1e150  #: stands for an infinite slope, whose inverse is flat
-SINGULAR = 1e-13  #: reciprocal condition of 1 + S D in a group, below which it is singular
+SINGULAR_GROUP = 1e-13  #: reciprocal condition of 1 + S D in a group, below which it is singular
 
 
 def feedback_of_elements(
@@ -60,7 +60,7 @@ def feedback_of_elements(
                 )
             P[row, row] = 1.0 / STEEPEST
     size = np.abs(P).max(axis=1, keepdims=True)  # rows of steep elements are large
-    if np.linalg.cond(P / size) * SINGULAR > 1.0 and not reduction.rests:
+    if np.linalg.cond(P / size) * SINGULAR_GROUP > 1.0 and not reduction.rests:
         places = [place for place, moves in zip(geometry.places, reduction.moving, strict=True) if moves]
         words, dofs = listed([place.words for place in places]), tuple(name for place in places for name in place.dofs)
         if singular == "refuse":

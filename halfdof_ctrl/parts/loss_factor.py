@@ -30,15 +30,14 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_spar
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.loss_branches import Branches, Loss, band_points, enough_branches
-from halfdof_ctrl.parts.loss_stiffness import directions, require_symmetric
+from halfdof_ctrl.parts.loss_stiffness import NAMED_SHARE, directions, require_symmetric
 
 Keep: TypeAlias = Literal["loss", "factor"]
 LossFactor: TypeAlias = float | Callable[[FloatArray], FloatArray] | tuple[Sequence[float], Sequence[float]] | None
 
 STEEPEST = 1.0  #: slope of the loss over frequency in log-log that springs and dampers can follow
 SLOPE_ROUNDING = 1e-6  #: by which a computed slope may exceed it
-ROUNDING = 1e-12  #: of the largest: a negative eigenvalue of the static stiffness below is rounding
-SHARE = 0.3  #: of the largest entry of a direction: DOFs above are named
+STIFFNESS_ROUNDING = 1e-12  #: of the largest: a negative eigenvalue of the static stiffness below is rounding
 SHIFT = 1e-9  #: of its diagonal, added to a sparse stiffness that is singular
 
 
@@ -214,7 +213,7 @@ def _tabulated(table: object, band: tuple[float, float]) -> Loss:
         sound = sound and bool((eta > 0.0).all())
     except (TypeError, ValueError):
         sound = False
-    if not sound or f[0] > band[0] * (1.0 + ROUNDING) or f[-1] < band[1] * (1.0 - ROUNDING):
+    if not sound or f[0] > band[0] * (1.0 + STIFFNESS_ROUNDING) or f[-1] < band[1] * (1.0 - STIFFNESS_ROUNDING):
         msg = (
             "loss_factor must be a positive number, a function of the angular frequency, or a table (frequency, eta) "
             f"with rising frequencies [Hz] that reach from {band[0]:.4g} to {band[1]:.4g} Hz and positive eta."
@@ -250,9 +249,9 @@ def _require_static(
         before = scipy.linalg.eigvalsh(K.toarray())
         negative = float(min(before[0], 0.0) - values[0]) / float(np.abs(values).max())
         vector = vectors[:, 0]
-    if negative > ROUNDING * len(model.dofs):
+    if negative > STIFFNESS_ROUNDING * len(model.dofs):
         part = np.abs(vector)
-        found = tuple([model.dofs[i] for i in np.flatnonzero(part > SHARE * part.max()).tolist()])
+        found = tuple([model.dofs[i] for i in np.flatnonzero(part > NAMED_SHARE * part.max()).tolist()])
         msg = (
             "With this loss kept over the band the stiffness at rest would be negative in a motion of "
             f"{listed(found)}: so much loss comes with so much stiffening. Narrow the band, or lower the loss there."

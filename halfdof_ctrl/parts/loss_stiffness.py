@@ -15,10 +15,10 @@ from halfdof_ctrl.base.errors import MatrixError, ModelSizeError, ParameterError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 
-ROUNDING = 16 * float(np.finfo(float).eps)  #: times the size: eigenvalues of a scaled block below are zero
-UNSYMMETRIC = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
+BLOCK_ROUNDING = 16 * float(np.finfo(float).eps)  #: times the size: eigenvalues of a scaled block below are zero
+UNSYMMETRIC_STIFFNESS = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
 LARGEST_BLOCK = 1500  #: DOFs that damping ties together
-SHARE = 0.3  #: of the largest entry of a direction: DOFs above are named
+NAMED_SHARE = 0.3  #: of the largest entry of a direction: DOFs above are named
 
 
 def directions(loss: SparseMatrix, dofs: tuple[str, ...], *, sparse: bool) -> tuple[SparseMatrix, FloatArray]:
@@ -88,7 +88,7 @@ def require_symmetric(matrix: SparseMatrix, letter: str) -> None:
         It is not.
     """
     difference = np.abs(csc_array(matrix - matrix.T).data).max(initial=0.0)
-    if difference > UNSYMMETRIC * np.abs(matrix.data).max(initial=0.0):
+    if difference > UNSYMMETRIC_STIFFNESS * np.abs(matrix.data).max(initial=0.0):
         msg = f"{letter} is not symmetric (by {difference:.1e}), so that it is no passive stiffness. Complete it first."
         raise MatrixError(msg, matrix=letter)
 
@@ -100,10 +100,10 @@ def _of_block(block: FloatArray, names: tuple[str, ...]) -> list[tuple[FloatArra
     scaled = block * scale * scale[:, None]
     scaled = (scaled + scaled.T) / 2.0
     values, vectors = scipy.linalg.eigh(scaled)
-    bound = ROUNDING * len(scaled) * max(float(values[-1]), float(np.abs(values).max()))
+    bound = BLOCK_ROUNDING * len(scaled) * max(float(values[-1]), float(np.abs(values).max()))
     if values[0] < -bound:
         part = np.abs(vectors[:, 0])
-        found = tuple([names[i] for i in np.flatnonzero(part > SHARE * part.max()).tolist()])
+        found = tuple([names[i] for i in np.flatnonzero(part > NAMED_SHARE * part.max()).tolist()])
         msg = (
             f"The damped stiffness K'' is negative in a motion of {listed(found)} (eigenvalue {values[0]:.2e} of "
             f"{values[-1]:.2e} in scaled units): that part would drive instead of damp. Look at the sign of its loss."

@@ -23,7 +23,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import AXES, Axes, axis_name, checked, part_axes
 
 TRANSLATIONS = 3
-ROUNDING = 1e-12  #: of the largest moment of inertia: the matrix is symmetric and semidefinite up to this
+INERTIA_ROUNDING = 1e-12  #: of the largest moment of inertia: the matrix is symmetric and semidefinite up to this
 
 
 def point_mass(m: float, axes: Axes = "z") -> SecondOrderModel:
@@ -135,11 +135,11 @@ def _checked_inertia(inertia: npt.ArrayLike) -> FloatArray:
     """Give the (3, 3) tensor, and refuse one that no body has: J is semidefinite, and no moment exceeds the others."""
     given = np.asarray(inertia)
     tensor = checked_matrix(np.diag(given) if given.shape == (TRANSLATIONS,) else given, "J", (TRANSLATIONS,) * 2)
-    if np.iscomplexobj(tensor) or np.abs(tensor - tensor.T).max() > ROUNDING * np.abs(tensor).max():
+    if np.iscomplexobj(tensor) or np.abs(tensor - tensor.T).max() > INERTIA_ROUNDING * np.abs(tensor).max():
         msg = f"inertia = {tensor.tolist()} kg m^2 is not a real symmetric tensor."
         raise ParameterError(msg, parameter="inertia", value=inertia)
     moments = np.linalg.eigvalsh(tensor)
-    if moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + ROUNDING):
+    if moments[0] <= 0.0 or moments[2] > (moments[0] + moments[1]) * (1.0 + INERTIA_ROUNDING):
         msg = (
             f"inertia has the principal moments {moments[0]:.4g}, {moments[1]:.4g}, {moments[2]:.4g} kg m^2, but in a "
             "rigid body each is positive and none exceeds the sum of the others. Check units and signs of the products."

@@ -22,7 +22,7 @@ THIRD_DIFFERENCES = 20.0  #: sum of the squares of 1, 3, 3, 1
 NORMAL_MEDIAN = 0.6745  #: of the size of a normal variable, in standard deviations
 COMPLEX_MEDIAN = 0.8326  #: of the size of a complex one, the root of log 2
 SIGMAS = 4.0  #: a negative loss beyond so many times the scatter is no scatter
-ROUNDING = 1e-12  #: of |K|: a negative loss below is none
+LOSS_ROUNDING = 1e-12  #: of |K|: a negative loss below is none
 FEWEST = 2  #: points of a curve
 
 
@@ -122,11 +122,11 @@ def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple
 def _require_loss(f: FloatArray, K: ComplexArray) -> None:
     """Refuse loss that is negative by more than its scatter."""
     sine = K.imag / np.abs(K)
-    bound = max(SIGMAS * min(scatter(sine), typical_scatter(sine)), ROUNDING)
+    bound = max(SIGMAS * min(scatter(sine), typical_scatter(sine)), LOSS_ROUNDING)
     negative = sine < -bound
-    if not negative.any() and np.count_nonzero(sine < -ROUNDING) <= f.size / 2:
+    if not negative.any() and np.count_nonzero(sine < -LOSS_ROUNDING) <= f.size / 2:
         return
-    if np.count_nonzero(sine < -ROUNDING) > f.size / 2:
+    if np.count_nonzero(sine < -LOSS_ROUNDING) > f.size / 2:
         msg = (
             f"The imaginary part of stiffness is negative at {np.count_nonzero(sine < 0.0)} of {f.size} points: that "
             "is the sign convention e^{-jwt}, in which this package does not compute. Pass the complex conjugate."
@@ -160,7 +160,7 @@ def _weights(values: ComplexArray, weight: Weight) -> FloatArray:
     if weight == "relative":
         return np.tile(1.0 / np.abs(values), (2, 1))
     floor = SIGMAS * scatter(values / np.abs(values)) * np.abs(values)
-    tiny = ROUNDING * np.abs(values)
+    tiny = LOSS_ROUNDING * np.abs(values)
     parts = [np.maximum(np.maximum(np.abs(part), floor), tiny) for part in (values.real, values.imag)]
     return 1.0 / np.array(parts)
 

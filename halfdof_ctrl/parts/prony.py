@@ -18,8 +18,9 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.fluid_column import FluidColumn, fluid_column
+from halfdof_ctrl.parts.loss_branches import MOST_BRANCHES
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve, Weight, measured_curve, scatter, typical_scatter
-from halfdof_ctrl.parts.prony_search import MOST_BRANCHES, best_series, chosen_order, criterion, lag_one, rms
+from halfdof_ctrl.parts.prony_search import best_series, chosen_order, criterion, lag_one, rms
 from halfdof_ctrl.parts.prony_series import Series
 from halfdof_ctrl.parts.rubber import generalized_maxwell
 

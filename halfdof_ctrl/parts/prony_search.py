@@ -19,7 +19,6 @@ from halfdof_ctrl.parts.loewner import rational_rates
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve, scatter
 from halfdof_ctrl.parts.prony_series import OUTSIDE, Series, best_sizes, refined, relaxing
 
-MOST_BRANCHES = 12
 PER_DECADE = 10  #: rates of the grid
 PER_DECADE_EXACT = 20  #: the same where the curve has no scatter
 BEYOND = 10.0  #: the grid reaches beyond the band by this factor

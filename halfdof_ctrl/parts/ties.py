@@ -21,7 +21,7 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 
 Row = dict[int, float]
 
-ROUNDING = 1e-12  #: of the entries that cancel: what is left of a tie that says nothing
+TIE_ROUNDING = 1e-12  #: of the entries that cancel: what is left of a tie that says nothing
 DEPENDENT = 1e-10  #: of a row of unit length: what earlier ties leave of one that follows from them
 
 
@@ -45,7 +45,7 @@ class Ties:
             else:
                 done[place] = done.get(place, 0.0) + value
                 size[place] = max(size.get(place, 0.0), abs(value))
-        return {place: value for place, value in done.items() if abs(value) > ROUNDING * size[place]}
+        return {place: value for place, value in done.items() if abs(value) > TIE_ROUNDING * size[place]}
 
     def tie(self, first: Mapping[int, float], second: Mapping[int, float], words: str, name: str) -> None:
         """Let two points move as one; the DOF of the second goes if one of them has to.

@@ -25,7 +25,7 @@ AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
 FIGURE_WIDTH = 6.0  #: [in] of a plot with one or two columns
 LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes finds the figure's legend
 LEGEND_SIZE = 9.0  #: [pt]
-USUAL_POINTS = 95.0  #: [%] of the points of the curves lie in the range that is shown in any case
+USUAL_WIDTH = 0.95  #: part of the width on which curves lie in the range that is shown in any case
 LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
 CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
 

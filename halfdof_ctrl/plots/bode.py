@@ -19,6 +19,7 @@ from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     CIRCLE,
+    USUAL_WIDTH,
     AxesArray,
     AxesLike,
     draw_grid,
@@ -45,7 +46,6 @@ PEAK_MARKS = 6  #: markers on the highest peaks besides
 ONE_MARKER = 0.05  #: relative distance between frequencies below which one marker does for two peaks
 PHASE_STEPS = (15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0, 1440.0)  #: [deg] between ticks
 MOST_PHASE_STEPS = 4
-USUAL_WIDTH = 0.95  #: part of the width on which a curve lies in the range that is shown in any case
 FLAT_RATIO = 1.0 + 1e-6  #: a curve with a smaller ratio of its ends is constant ...
 FLAT_ROOM = 5.0  #: ... and gets this factor above and below
 RESONANCE_SPIKE = 1e5  #: a peak higher than this times that range is cut

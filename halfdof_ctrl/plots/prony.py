@@ -9,7 +9,7 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.parts.prony import PronyFit, counted
 from halfdof_ctrl.plots.axes import AxesLike, draw_grid, draw_legend, label_y, no_lines, prepared_axes
 
-POINTS = 400  #: frequencies of the curves
+CURVE_POINTS = 400  #: frequencies of the curves
 
 
 def prony_plot(
@@ -54,7 +54,7 @@ def prony_plot(
         msg = f"prony_plot draws what fit_prony returned, not a {type(fit).__name__}."
         raise ParameterError(msg, parameter="fit", value=fit)
     axes = prepared_axes(ax, (2, 1), "real and imaginary part in rows", height=4.2)
-    f = np.geomspace(fit.frequency[0], fit.frequency[-1], POINTS)
+    f = np.geomspace(fit.frequency[0], fit.frequency[-1], CURVE_POINTS)
     curves = [(counted(fit.k.size), fit(f), "-")]
     if fit.fluid is not None:
         values = fit.fluid.part.prescribe_motion("bottom").select("F_top", "top")(2j * np.pi * f)

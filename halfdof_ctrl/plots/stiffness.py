@@ -14,6 +14,7 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
+    USUAL_WIDTH,
     AxesArray,
     AxesLike,
     draw_grid,
@@ -42,7 +43,6 @@ ANGLE_STEPS = {
     False: (1.0, 2.0, 5.0, 10.0),
 }  #: of ticks, by WIDE_ANGLES or not
 WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
-USUAL_WIDTH = 0.95  #: part of the width on which the curves lie in the range that is shown in any case
 STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
 ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
 CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant

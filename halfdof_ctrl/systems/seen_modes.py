@@ -22,12 +22,12 @@ from halfdof_ctrl.systems.pole_bounds import UNIT, BoundedPoles, bounded_poles
 
 Response: TypeAlias = Callable[[ComplexArray], ComplexArray]  #: s (k,) to H (p, m, k)
 
-CIRCLE_POINTS = 16
+POINTS_AROUND = 16
 TOGETHER = 16.0  #: poles nearer than this times the sum of their bounds are one cluster ...
 SAME = 1e-6  #: ... and those nearer than this part of their size
 WITHIN = 0.1  #: radius of a circle, of the distance to the next pole and of the pole's size
 AROUND = 3.0  #: radius of a circle, of the spread of a cluster
-ROUNDING = 64.0 * UNIT  #: of the largest |H| on a circle: coefficients below are none
+CIRCLE_ROUNDING = 64.0 * UNIT  #: of the largest |H| on a circle: coefficients below are none
 VISIBLE = 1e-3  #: part of the rest of H that a pole adds where it adds most
 MOST_TERMS = 8  #: of a principal part
 NO_CHANNEL = 1e-12  #: channels that move less than this part of the largest are rounding
@@ -103,12 +103,12 @@ def seen_poles(poles: BoundedPoles, response: Response, direct: FloatArray, *, r
     frequency |= values == 0.0
     if not clusters:
         return SeenModes(values, poles.bounds, frequency, step)
-    turn = np.exp(2j * np.pi * np.arange(CIRCLE_POINTS) / CIRCLE_POINTS)
+    turn = np.exp(2j * np.pi * np.arange(POINTS_AROUND) / POINTS_AROUND)
     circles = np.concatenate([cluster.centre + cluster.radius * turn for cluster in clusters])
     tops = np.array([cluster.top for cluster in clusters])
     with np.errstate(all="ignore"):
         found = response(np.concatenate([circles, tops]))
-    on_circles = found[:, :, : circles.size].reshape(*found.shape[:2], len(clusters), CIRCLE_POINTS)
+    on_circles = found[:, :, : circles.size].reshape(*found.shape[:2], len(clusters), POINTS_AROUND)
     at_tops = found[:, :, circles.size :]
     steps = np.empty((*found.shape[:2], len(clusters)))
     for k, cluster in enumerate(clusters):
@@ -156,7 +156,7 @@ def _principal_part(values: ComplexArray, cluster: _Cluster, turn: ComplexArray)
     terms = []
     for k in range(1, min(cluster.places.size, MOST_TERMS) + 1):
         mean = (values * turn**k).mean(axis=2)
-        terms.append(np.where(np.abs(mean) > ROUNDING * largest, mean * cluster.radius**k, 0.0))
+        terms.append(np.where(np.abs(mean) > CIRCLE_ROUNDING * largest, mean * cluster.radius**k, 0.0))
     return np.asarray(np.nan_to_num(np.array(terms)))
 
 

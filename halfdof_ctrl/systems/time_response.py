@@ -30,8 +30,8 @@ from halfdof_ctrl.systems.working_states import working_map
 Motion: TypeAlias = npt.ArrayLike | Mapping[str, float] | None
 Histories: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike]
 
-EVEN = 1e-6  #: relative differences between time steps that are rounding
-MOST_RECOVERED = 200  #: DOFs of a sparse model up to which times are chosen for all of them, not only for outputs
+EVEN_TIMES = 1e-6  #: relative differences between time steps that are rounding
+MOST_TIMED = 200  #: DOFs of a sparse model up to which times are chosen for all of them, not only for outputs
 
 
 def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None) -> control.TimeResponseData:
@@ -183,7 +183,7 @@ def checked_times(timepts: npt.ArrayLike) -> FloatArray:
     """
     given = np.asarray(timepts, dtype=float)
     steps = np.diff(given) if given.ndim == 1 else np.zeros(0)
-    if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN * steps[0]).all():
+    if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN_TIMES * steps[0]).all():
         msg = (
             "timepts must be rising, equidistant times [s], at least two, since python-control simulates on no "
             "others: take numpy.linspace, or give the last time alone."
@@ -213,7 +213,7 @@ class _Plant:
         if timepts is not None and np.ndim(timepts) > 0:
             return checked_times(timepts)
         A, B, C, D = (np.asarray(part, dtype=float) for part in (self.sys.A, self.sys.B, self.sys.C, self.sys.D))
-        if not (self.model.is_sparse and len(self.model.dofs) > MOST_RECOVERED):
+        if not (self.model.is_sparse and len(self.model.dofs) > MOST_TIMED):
             motion = (self.reduction if self.states is None else self.states).displacement
             motion = motion.whole() if isinstance(motion, SparseDisplacement) else motion
             C, D = np.vstack([C, motion.X]), np.vstack([D, motion.direct(self.sys.ninputs)])

@@ -13,6 +13,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -154,8 +155,8 @@ def main(largest: int) -> None:
             with tempfile.TemporaryDirectory() as folder:
                 paths = write(Path(folder), n)
                 texts = [path for path in paths if path.suffix != ".op4"]
-                alone = sum(seconds(lambda path=path: numbers_alone(path)) for path in texts)
-                spent = seconds(lambda first=paths[0]: hd.load_model(first))
+                alone = sum(seconds(partial(numbers_alone, path)) for path in texts)
+                spent = seconds(partial(hd.load_model, paths[0]))
             growth = f"{spent / before:8.2f}" if before else " " * 8
             print(f"{name:26s}{n:10d}{spent:16.2f}{growth}" + (f"{spent / alone:18.1f}" if texts else ""), flush=True)
             before = spent

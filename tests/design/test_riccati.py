@@ -99,9 +99,9 @@ def test_weak_damper_at_a_massless_node_takes_no_digits(damper: float) -> None:
 def test_rounding_that_moves_the_gain_is_announced_or_refused() -> None:
     """A mode that the actuator reaches by little has a gain with few digits or none."""
     with pytest.warns(InaccurateGainWarning, match="The gain is known to"):
-        _nearly_unreached(3e-12)
+        _nearly_unreached(1e-12)
     with pytest.raises(StabilizationError, match=r"known to|not told from nothing"):
-        _nearly_unreached(1e-13)
+        _nearly_unreached(4e-14)
 
 
 def _nearly_unreached(difference: float) -> object:

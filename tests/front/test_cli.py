@@ -314,7 +314,7 @@ def test_an_interrupt_is_silent_and_exit_code_130(
 ) -> None:
     """As shells report it."""
 
-    def interrupted(*_: object) -> None:
+    def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
     monkeypatch.setattr("halfdof_ctrl.commands.mech2ss", interrupted)
@@ -327,7 +327,7 @@ def test_a_refusal_of_many_lines_is_printed_as_one(
 ) -> None:
     """Whatever stands in a name or in a message of another library."""
 
-    def refused(*_: object) -> None:
+    def refused(*_: object, **__: object) -> None:
         msg = "two\nlines"
         raise HalfdofError(msg)
 
