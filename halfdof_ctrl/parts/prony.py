@@ -84,7 +84,7 @@ class PronyFit:
 
     def __repr__(self) -> str:
         """Give the sizes with their standard errors, and the verdict."""
-        lines = [f"PronyFit: {self.k.size} branches on {self.frequency.size} points, rms {self.rms:.2e}"]
+        lines = [f"PronyFit: {counted(self.k.size)} on {self.frequency.size} points, rms {self.rms:.2e}"]
         lines.append(f"  k0 = {self.k0:.6g} ± {self.standard_errors['k0'].item():.1e} N/m")
         if self.c0:
             lines.append(f"  c0 = {self.c0:.6g} ± {self.standard_errors['c0'].item():.1e} N s/m")
@@ -113,7 +113,8 @@ def fit_prony(
     branches : int, optional
         Number of springs and dampers in series; by default the number that Akaike's criterion chooses, up to 12.
     weight : {"relative", "absolute", "parts"}
-        What is minimised: errors over |K| (default), errors as they are, or errors of K' over K' and of K'' over K''.
+        What is minimised: errors over the modulus (default), errors as they are, or errors of K' over
+        K' and of K'' over K''.
     static_stiffness : float, optional
         Stiffness at rest [N/m], from a static test; by default it is found from the curve.
 
@@ -154,6 +155,15 @@ def fit_prony(
     follows = _follows(curve, series, found.grid)
     fluid = None if follows else fluid_column(curve)
     return _fit(curve, series, weight, floor=rms(curve, found.grid), orders=orders, fluid=fluid, asked=branches)
+
+
+def counted(count: int) -> str:
+    """Return a number of branches in words.
+
+    >>> counted(1), counted(3)
+    ('1 branch', '3 branches')
+    """
+    return f"{count} branch" if count == 1 else f"{count} branches"
 
 
 def _most_branches(curve: MeasuredCurve, branches: int | None) -> int:

@@ -6,7 +6,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.parts.prony import PronyFit
+from halfdof_ctrl.parts.prony import PronyFit, counted
 from halfdof_ctrl.plots.axes import AxesLike, draw_grid, draw_legend, label_y, no_lines, prepared_axes
 
 CURVE_POINTS = 400  #: frequencies of the curves
@@ -55,7 +55,7 @@ def prony_plot(
         raise ParameterError(msg, parameter="fit", value=fit)
     axes = prepared_axes(ax, (2, 1), "real and imaginary part in rows", height=4.2)
     f = np.geomspace(fit.frequency[0], fit.frequency[-1], CURVE_POINTS)
-    curves = [(f"{fit.k.size} branches", fit(f), "-")]
+    curves = [(counted(fit.k.size), fit(f), "-")]
     if fit.fluid is not None:
         values = fit.fluid.part.prescribe_motion("bottom").select("F_top", "top")(2j * np.pi * f)
         curves.append((f"with fluid at {fit.fluid.frequency:.3g} Hz", 1.0 / values, "--"))
@@ -70,7 +70,7 @@ def prony_plot(
     axes[1, 0].set_xlabel("frequency [Hz]")
     draw_grid(axes[:, 0], on=grid)
     legend = draw_legend(axes, own=ax is None)
-    heading = f"{fit.k.size} branches, rms {fit.rms:.1e}" if title is None else title
+    heading = f"{counted(fit.k.size)}, rms {fit.rms:.1e}" if title is None else title
     if ax is None:
         axes[0, 0].figure.suptitle(heading)
     else:

@@ -157,7 +157,7 @@ def test_scatter_of_a_small_loss_is_no_negative_loss() -> None:
 def test_print_states_sizes_errors_and_verdict() -> None:
     """What a user reads."""
     text = repr(hd.fit_prony(F, scattered(series(F, 3e4, [1e4], [60.0]), 0), branches=1))
-    assert text.startswith("PronyFit: 1 branches on 50 points, rms ")
+    assert text.startswith("PronyFit: 1 branch on 50 points, rms ")
     assert "k0 = " in text
     assert "± " in text
     assert "A Maxwell series follows the curve" in text

@@ -45,5 +45,7 @@ def test_nearly_free_is_not_free(stiffness: float) -> None:
 def test_poles_without_energy_coordinates_come_from_the_pencil() -> None:
     """A follower force makes K unsymmetric: both ways to the poles agree."""
     model = mechss(np.eye(2), 0.1 * np.eye(2), [[2.0, 1.0], [-1.0, 3.0]])
-    one, other = (np.sort_complex(poles.values) for poles in (pencil_poles(model), bounded_poles(exact_reduction(model).A)))
+    one, other = (
+        np.sort_complex(poles.values) for poles in (pencil_poles(model), bounded_poles(exact_reduction(model).A))
+    )
     assert_allclose(one, other, rtol=DIGITS)

@@ -158,16 +158,15 @@ def truncate_modes(
     """
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
-    parts = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    whole = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    parts = dict(whole)
     if model.is_complex:  # modes are those of the real part; both are projected on them
         parts |= {"K": csc_array(parts["K"].real), LOST: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
     band = (top / 10.0**DECADES, top)
-    if LOST in parts:  # the poles are those of the whole stiffness
-        parts = {letter: part for letter, part in parts.items() if letter != LOST} | {"K": as_sparse(model.K)}
-    resonances = resonance_errors(parts, small, basis, band)
+    resonances = resonance_errors(whole, small, basis, band)
     return _measured(model, small, motions, resonances, (band, points))
 
 
