@@ -34,7 +34,7 @@ from halfdof_ctrl.systems.phase import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
-from halfdof_ctrl.systems.working_states import response_of_form, working_form
+from halfdof_ctrl.systems.working_states import response_of_model, working_form
 
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
@@ -128,7 +128,7 @@ def frequency_response(
     -----
     The states are balanced by powers of two and all points are worked side by side on a Hessenberg
     form; no eigenvectors are used, so defective systems are as safe as others. See `hessenberg`. A model is worked in
-    energy coordinates where it has them, whatever states `mech2ss` gives.
+    energy coordinates where it has them and DOF states lose digits, whatever states `mech2ss` gives.
 
     Examples
     --------
@@ -144,17 +144,18 @@ def frequency_response(
             sys = mech2ss(sysdata)
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
-        form = working_form(sysdata, sys.nstates)
     else:
-        sys, form = sysdata, None
+        sys = sysdata
     if omega is None:
+        form = None if model is None else working_form(model, sys.nstates)
         omega = system_frequencies(sys if form is None else energy_state_space(form), model)
     frequencies = checked_frequencies(omega)
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
     A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    values = state_space_response(A, B, C, D, points) if form is None else response_of_form(form, (A, B, C, D), points)
+    dofs = A, B, C, D
+    values = state_space_response(*dofs, points) if model is None else response_of_model(model, dofs, points)
     data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
     return with_source(data, source_of(sys if model is None else model) or source_of(sys))
 

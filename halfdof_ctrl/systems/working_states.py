@@ -101,6 +101,35 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     return sys if form is None else energy_state_space(form)
 
 
+def response_of_model(
+    model: SecondOrderModel, dofs: tuple[FloatArray, FloatArray, FloatArray, FloatArray], points: ComplexArray
+) -> ComplexArray:
+    """Evaluate a model in the states that keep most digits.
+
+    A model with many states is evaluated in DOF states, and stays there if these are right wherever it is tested by
+    refined solves of the descriptor form; energy coordinates cost more than that.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        Proper, with N states, m inputs and p outputs.
+    dofs : (N, N), (N, m), (p, N), (p, m) ndarrays
+        A, B, C, D in DOF states.
+    points : (k,) complex ndarray
+
+    Returns
+    -------
+    (p, m, k) complex ndarray
+    """
+    order = len(dofs[0])
+    if order > FEW_STATES and not model.is_sparse:
+        values = state_space_response(*dofs, points)
+        if _is_sound(model, values, points):
+            return values
+    form = working_form(model, order)
+    return state_space_response(*dofs, points) if form is None else response_of_form(form, dofs, points)
+
+
 def response_of_form(
     form: EnergyForm, dofs: tuple[FloatArray, FloatArray, FloatArray, FloatArray], points: ComplexArray
 ) -> ComplexArray:
