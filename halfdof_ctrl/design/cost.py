@@ -12,7 +12,6 @@ from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
 
@@ -110,7 +109,7 @@ def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[F
 
 def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
     """Return the rows and weights of the kinetic and the elastic energy."""
-    model, part = reduction.model, reduction.partition
+    model, m = reduction.model, reduction.B.shape[1]
     if model.prescribed:
         msg = (
             f"The motion of {listed(model.prescribed)} is prescribed, so that the mechanical energy is no function of "
@@ -127,11 +126,7 @@ def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatA
     if reduction.shift:
         msg = "The energy of a model on which derivatives of inputs act (Bv, Ba) is no function of its states alone."
         raise WeightError(msg, names=("energy",))
-    n, m = reduction.B.shape
-    if isinstance(part, DofPartition):  # only what has mass, whose velocity is a state
-        velocity = np.hstack([np.zeros((len(model.dofs), n - part.n_inertial)), part.T[:, : part.n_inertial]])
-    else:
-        velocity = reduction.motion(1).X
+    velocity = reduction.motion(1).X  # what has no mass stores nothing
     displacement = reduction.displacement
     return [
         (velocity, np.zeros((len(model.dofs), m)), 0.5 * weight * model.M),
