@@ -26,7 +26,7 @@ from halfdof_ctrl.base.arrays import (
 from halfdof_ctrl.base.errors import MatrixError
 
 if TYPE_CHECKING:
-    from typing_extensions import TypeIs
+    from typing_extensions import TypeIs  # for the type checker alone, which brings it; in typing from Python 3.13 on
 
 SparseMatrix: TypeAlias = csc_array
 IndexArray: TypeAlias = npt.NDArray[np.intp]
