@@ -6,7 +6,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import issparse
+from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.errors import MatrixError
 
@@ -14,7 +14,11 @@ EPS = float(np.finfo(float).eps)  #: spacing of floating-point numbers at one
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]
-Matrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
+DenseMatrix: TypeAlias = npt.NDArray[Any]  #: float64 or complex128, as checked_matrix gives it
+Matrix: TypeAlias = DenseMatrix | csc_array  #: either kind; `as_dense`, `as_sparse` and `is_sparse` tell which
+#: What a model holds: arrays, or csc_array in a sparse model. `Any` stands for the latter, so that who knows the model
+#: to be dense, users above all, need not narrow each matrix; a function that takes either kind says `Matrix`.
+ModelMatrix: TypeAlias = DenseMatrix | Any
 DENSE_ROW_LIMIT = 5000  #: larger sparse matrices are refused rather than expanded (200 MB each)
 LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense for what works on dense matrices alone
 MATRIX_DIMENSIONS = 2
@@ -23,7 +27,7 @@ PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copie
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
-def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> Matrix:
+def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> DenseMatrix:
     """Copy a value into a read-only matrix of finite numbers.
 
     Parameters
@@ -75,7 +79,7 @@ def require_shape(found: tuple[int, ...], letter: str, shape: tuple[int, int] | 
         raise MatrixError(msg, matrix=letter)
 
 
-def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matrix]:
+def checked_square_matrices(values: Sequence[object], letters: str) -> list[DenseMatrix]:
     """Copy square matrices of one size into read-only ones, as `checked_matrix` does; None becomes zeros.
 
     Raises
@@ -88,7 +92,7 @@ def checked_square_matrices(values: Sequence[object], letters: str) -> list[Matr
         if together is not None:
             return together
     size: tuple[int, int] | None = None
-    checked: list[Matrix | None] = []
+    checked: list[DenseMatrix | None] = []
     for letter, value in zip(letters, values, strict=True):
         checked.append(None if value is None else checked_matrix(value, letter, size))
         if size is None and checked[-1] is not None:
@@ -127,7 +131,7 @@ def is_zero(matrix: Matrix) -> bool:
     return shared or not matrix.any()
 
 
-def _numbers(value: object, letter: str) -> Matrix:
+def _numbers(value: object, letter: str) -> DenseMatrix:
     if hasattr(value, "toarray") and hasattr(value, "nnz"):
         value = _dense(value, letter)
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
@@ -151,7 +155,7 @@ def _numbers(value: object, letter: str) -> Matrix:
     raise MatrixError(msg, matrix=letter)
 
 
-def _stacked(values: Sequence[object]) -> list[Matrix] | None:
+def _stacked(values: Sequence[object]) -> list[DenseMatrix] | None:
     """Copy real matrices in one piece, which is faster; None if anything about them wants a closer look."""
     try:
         stack = np.array(values)
@@ -176,13 +180,18 @@ def _dense(value: object, letter: str) -> object:
     return value.toarray()  # type: ignore[attr-defined]
 
 
-def _as_row_or_column(array: Matrix, shape: tuple[int, int]) -> Matrix:
+def _as_row_or_column(array: DenseMatrix, shape: tuple[int, int]) -> DenseMatrix:
     if 1 in shape and array.size == shape[0] * shape[1]:
         return array.reshape(shape)
     return array
 
 
-def read_only(array: Matrix) -> Matrix:
+def as_dense(matrix: Matrix) -> DenseMatrix:
+    """Return a matrix of a model as an array, which those of a dense model are."""
+    return matrix if isinstance(matrix, np.ndarray) else matrix.toarray()
+
+
+def read_only(array: DenseMatrix) -> DenseMatrix:
     """Lock an array of our own against writing and give it back."""
     array.setflags(write=False)
     return array

@@ -17,7 +17,7 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.double_double import BITS, SPLITTER
-from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, is_sparse
+from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
@@ -59,7 +59,7 @@ class SlicedMatrix:
 class ExactPolynomial:
     """``R_0 + R_1 s + R_2 s^2`` with coefficients cut for exact products."""
 
-    def __init__(self, coefficients: Sequence[Matrix] | Sequence[SparseMatrix]) -> None:
+    def __init__(self, coefficients: Sequence[Matrix]) -> None:
         self.parts: list[tuple[int, complex, SlicedMatrix]] = []
         for power, coefficient in enumerate(coefficients):
             matrix: Any = coefficient

@@ -5,7 +5,7 @@ kind, its inputs and outputs included.
 """
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeAlias, cast
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ from halfdof_ctrl.base.arrays import (
     REAL,
     FloatArray,
     Matrix,
+    ModelMatrix,
     checked_matrix,
     read_only,
     require_shape,
@@ -23,6 +24,9 @@ from halfdof_ctrl.base.arrays import (
     zero_matrix,
 )
 from halfdof_ctrl.base.errors import MatrixError
+
+if TYPE_CHECKING:
+    from typing_extensions import TypeIs  # for the type checker alone, which brings it; in typing from Python 3.13 on
 
 SparseMatrix: TypeAlias = csc_array
 IndexArray: TypeAlias = npt.NDArray[np.intp]
@@ -47,7 +51,7 @@ def has_sparse(values: Sequence[object]) -> bool:
     return any(issparse(value) for value in values)
 
 
-def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> Matrix:
+def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> SparseMatrix:
     """Copy a value into read-only compressed columns of finite numbers.
 
     Parameters
@@ -62,8 +66,7 @@ def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | N
     Returns
     -------
     csc_array
-        float64, or complex128 where an imaginary part is nonzero; typed as the dense matrices are, since a model holds
-        either kind.
+        float64, or complex128 where an imaginary part is nonzero.
 
     Raises
     ------
@@ -100,7 +103,7 @@ def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | N
     return _locked(matrix.astype(np.complex128 if matrix.dtype.kind == "c" else REAL, copy=False))
 
 
-def checked_sparse_squares(values: Sequence[object], letters: str) -> list[Matrix]:
+def checked_sparse_squares(values: Sequence[object], letters: str) -> list[SparseMatrix]:
     """Copy square matrices of one size, of which some are sparse, into sparse ones; None becomes zeros.
 
     Raises
@@ -116,44 +119,44 @@ def checked_sparse_squares(values: Sequence[object], letters: str) -> list[Matri
     ]
 
 
-def sparse_zeros(rows: int, columns: int) -> Matrix:
+def sparse_zeros(rows: int, columns: int) -> SparseMatrix:
     """Return a read-only sparse matrix without entries."""
     return _locked(csc_array((rows, columns)))
 
 
-def sparse_unit(size: int) -> Matrix:
+def sparse_unit(size: int) -> SparseMatrix:
     """Return a read-only sparse identity matrix."""
     return _locked(csc_array(eye_array(size, format="csc")))
 
 
-def zeros_like(pattern: Matrix, rows: int, columns: int) -> Matrix:
+def zeros_like(pattern: Matrix, rows: int, columns: int) -> ModelMatrix:
     """Return zeros, dense or sparse as `pattern` is."""
     return sparse_zeros(rows, columns) if is_sparse(pattern) else zero_matrix(rows, columns)
 
 
-def unit_like(pattern: Matrix, size: int) -> Matrix:
+def unit_like(pattern: Matrix, size: int) -> ModelMatrix:
     """Return an identity matrix, dense or sparse as `pattern` is."""
     return sparse_unit(size) if is_sparse(pattern) else unit_matrix(size)
 
 
-def is_sparse(matrix: object) -> bool:
+def is_sparse(matrix: object) -> "TypeIs[SparseMatrix]":
     """Return whether a matrix of a model is sparse."""
     return isinstance(matrix, csc_array)
 
 
 def as_sparse(matrix: Matrix) -> SparseMatrix:
     """Return a matrix of a model as compressed columns, which those of a sparse model are."""
-    return cast("SparseMatrix", matrix) if is_sparse(matrix) else csc_array(matrix)
+    return matrix if is_sparse(matrix) else csc_array(matrix)
 
 
-def picked_beside(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
+def picked_beside(parts: Sequence[ModelMatrix], picked: Sequence[int]) -> ModelMatrix:
     """Return the picked columns of matrices that stand side by side, all dense or all sparse."""
     if not is_sparse(parts[0]):
         return read_only(np.hstack(parts)[:, picked])
     return _locked(csc_array(as_sparse(joined_sparse([parts]))[:, list(picked)]))
 
 
-def picked_below(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
+def picked_below(parts: Sequence[ModelMatrix], picked: Sequence[int]) -> ModelMatrix:
     """Return the picked rows of matrices that stand one below the other, all dense or all sparse."""
     if not is_sparse(parts[0]):
         return read_only(np.vstack(parts)[picked])
@@ -161,7 +164,7 @@ def picked_below(parts: Sequence[Matrix], picked: Sequence[int]) -> Matrix:
     return _locked(csc_array(stack[list(picked)]))
 
 
-def joined_sparse(blocks: Sequence[Sequence[Matrix]]) -> Matrix:
+def joined_sparse(blocks: Sequence[Sequence[Matrix]]) -> SparseMatrix:
     """Join blocks, dense or sparse, to one sparse matrix, complex only where there are imaginary parts."""
     columns = [
         np.concatenate([[0], np.cumsum([block.shape[1] for block in row])]) for row in blocks
@@ -201,9 +204,9 @@ def filled_rows(matrices: Sequence[Matrix]) -> list[bool]:
     return filled.tolist()
 
 
-def transposed(matrix: Matrix) -> Matrix:
+def transposed(matrix: Matrix) -> SparseMatrix:
     """Return the transpose of a sparse matrix in compressed columns."""
-    return cast("Matrix", csc_array(as_sparse(matrix).T))
+    return csc_array(as_sparse(matrix).T)
 
 
 def column_of_entries(matrix: SparseMatrix) -> IndexArray:
@@ -222,15 +225,15 @@ def largest_by_row_and_column(matrix: SparseMatrix) -> tuple[FloatArray, FloatAr
     return by_row, by_column
 
 
-def locked(matrix: Matrix) -> Matrix:
+def locked(matrix: Matrix) -> ModelMatrix:
     """Lock a matrix of our own, dense or sparse, against writing."""
     return _locked(csc_array(matrix, copy=True)) if issparse(matrix) else read_only(matrix)
 
 
-def _locked(matrix: SparseMatrix) -> Matrix:
+def _locked(matrix: SparseMatrix) -> SparseMatrix:
     """Bring into order, drop stored zeros, and lock against writing."""
     matrix.sum_duplicates()
     matrix.eliminate_zeros()
     for part in (matrix.data, matrix.indices, matrix.indptr):
         part.setflags(write=False)
-    return cast("Matrix", matrix)
+    return matrix

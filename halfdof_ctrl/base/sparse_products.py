@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csc_array, csr_array
 
-from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.arrays import DenseMatrix
 from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
 
 EXTENDED = 2**20  #: entries of a matrix that are copied in extended precision at a time
@@ -26,17 +26,19 @@ class Transposed:
             return cls(None, csr_array(matrix.T))
         return cls(rows, csr_array(matrix.T[:, rows]))
 
-    def times(self, dense: Matrix) -> Matrix:
+    def times(self, dense: DenseMatrix) -> DenseMatrix:
         """Multiply with a dense matrix."""
         return np.asarray(self.part @ (dense if self.rows is None else dense[self.rows]))
 
 
-def times(matrix: SparseMatrix, dense: Matrix) -> Matrix:
+def times(matrix: SparseMatrix, dense: DenseMatrix) -> DenseMatrix:
     """Multiply a sparse and a dense matrix."""
     return np.asarray(matrix @ dense)
 
 
-def exact_residual(matrix: SparseMatrix, right: Matrix, solution: Matrix, *, transposed: bool = False) -> Matrix:
+def exact_residual(
+    matrix: SparseMatrix, right: DenseMatrix, solution: DenseMatrix, *, transposed: bool = False
+) -> DenseMatrix:
     """Return ``right - matrix solution``, summed in extended precision and rounded once.
 
     Some columns of the matrix are worked at a time, so that it is not copied in that precision. Where a long double is

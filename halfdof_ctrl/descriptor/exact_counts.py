@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.arrays import DenseMatrix
 from halfdof_ctrl.descriptor.residues import PRIMES, Residues, product, rank, reduced, residues
 
 RANK_SEED = 20261129  #: of the points at which ranks are looked at
@@ -45,7 +45,7 @@ class ExactCounts:
 
 
 def exact_counts(
-    coefficients: Sequence[Matrix], *, at_infinity: bool = True, primes: Sequence[int] = PRIMES
+    coefficients: Sequence[DenseMatrix], *, at_infinity: bool = True, primes: Sequence[int] = PRIMES
 ) -> ExactCounts:
     """Count what the square matrix polynomial has, modulo two primes.
 
@@ -76,7 +76,7 @@ def exact_counts(
     return max(found, key=lambda counts: (counts.rank, counts.degree, -counts.at_origin))
 
 
-def normal_rank(coefficients: Sequence[Matrix]) -> int:
+def normal_rank(coefficients: Sequence[DenseMatrix]) -> int:
     """Return the rank that a matrix polynomial of any shape has almost everywhere."""
     return max(rank(at_point([residues(part, p) for part in coefficients], random_point(p), p), p) for p in PRIMES)
 
@@ -136,7 +136,7 @@ def at_point(parts: Sequence[Residues], s0: int, p: int) -> Residues:
     return value
 
 
-def _counts(coefficients: Sequence[Matrix], p: int, *, at_infinity: bool) -> ExactCounts:
+def _counts(coefficients: Sequence[DenseMatrix], p: int, *, at_infinity: bool) -> ExactCounts:
     parts, s0 = [residues(part, p) for part in coefficients], random_point(p)
     n = len(parts[0])
     N, normal, r = shifted_inverse(parts, s0, p)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT, Evidence, Pencil, deflated, deflated_once
 
 GENERIC_POINTS = (0.6 + 0.8j, 1.3 + 0.4j, 0.2 + 2.1j)  #: of a mean frequency: ranks there hold almost everywhere
@@ -42,7 +42,7 @@ class InfinitePart:
         return tuple([sum(step > block for step in self.steps) for block in range(max(self.steps, default=0))])
 
 
-def finite_part(A: Matrix, E: Matrix) -> FinitePart:
+def finite_part(A: DenseMatrix, E: DenseMatrix) -> FinitePart:
     """Find the finite eigenvalues of the pencil ``A - s E``.
 
     Parameters
@@ -73,7 +73,7 @@ def finite_part(A: Matrix, E: Matrix) -> FinitePart:
     return by_blocks if agree or not both_ways.is_certain else both_ways
 
 
-def infinite_part(A: Matrix, E: Matrix) -> InfinitePart:
+def infinite_part(A: DenseMatrix, E: DenseMatrix) -> InfinitePart:
     """Find the structure at infinity of the pencil ``A - s E``, which must be regular.
 
     Each deflation takes out the algebraic rows and as many unknowns, which makes every Jordan block at infinity

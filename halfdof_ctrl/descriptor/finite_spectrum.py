@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.contours import contour
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.groups import Listed, separated
@@ -63,7 +63,7 @@ class _Findings:
 
 
 def finite_spectrum(
-    coefficients: Sequence[Matrix], counts: ExactCounts | None = None, *, primes: Sequence[int] = PRIMES
+    coefficients: Sequence[DenseMatrix], counts: ExactCounts | None = None, *, primes: Sequence[int] = PRIMES
 ) -> FiniteSpectrum:
     """Find the finite eigenvalues of a regular matrix polynomial.
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.balancing import balancing_powers, equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import connected_parts
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
@@ -27,12 +27,12 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 class FirstOrderPencil:
     """``A - s E`` of equation (8), balanced."""
 
-    A: Matrix  #: (k + r, l + r) for coefficients of shape (k, l) and rank R_2 = r
-    E: Matrix  #: likewise
+    A: DenseMatrix  #: (k + r, l + r) for coefficients of shape (k, l) and rank R_2 = r
+    E: DenseMatrix  #: likewise
     scale: float  #: unit of time: eigenvalues times this are in rad/s
 
 
-def first_order_pencil(coefficients: Sequence[Matrix]) -> FirstOrderPencil:
+def first_order_pencil(coefficients: Sequence[DenseMatrix]) -> FirstOrderPencil:
     """Write ``R_0 + R_1 s + R_2 s^2`` as the pencil (8), square or not."""
     scale = time_scale(coefficients)
     R0, R1, R2 = coefficients[0], coefficients[1] * scale, coefficients[2] * scale * scale  # scale^2 may overflow
@@ -46,7 +46,7 @@ def first_order_pencil(coefficients: Sequence[Matrix]) -> FirstOrderPencil:
     return FirstOrderPencil(A, E, scale)
 
 
-def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
+def _low_rank_factors(matrix: DenseMatrix) -> tuple[DenseMatrix, DenseMatrix]:
     """Factor a matrix as L R with as many columns in L as its rank, one connected part of its pattern at a time."""
     lefts, rights = [np.zeros((matrix.shape[0], 0))], [np.zeros((0, matrix.shape[1]))]
     for rows, columns in connected_parts(matrix != 0.0):
@@ -58,7 +58,7 @@ def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
     return np.hstack(lefts), np.vstack(rights)
 
 
-def _factors_of_part(part: Matrix) -> tuple[Matrix, Matrix]:
+def _factors_of_part(part: DenseMatrix) -> tuple[DenseMatrix, DenseMatrix]:
     down, across = equilibrating_powers(np.abs(part))
     left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
     rank = int(np.count_nonzero(values > ZERO_PIVOT * max(part.shape) * values[0]))
@@ -68,7 +68,7 @@ def _factors_of_part(part: Matrix) -> tuple[Matrix, Matrix]:
     return left * values[:rank] / down[:, None], right / across
 
 
-def time_scale(coefficients: Sequence[Matrix]) -> float:
+def time_scale(coefficients: Sequence[DenseMatrix]) -> float:
     """Return a typical frequency as a power of two: the mean, in the logarithm, of what each entry has to say.
 
     A place (i, j) with entries in R_h and R_l, h > l the highest and the lowest there are, balances at the frequency

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
@@ -27,7 +27,7 @@ class FoundStructure:
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
-def found_structure(coefficients: Sequence[Matrix]) -> FoundStructure:
+def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
     """Find counts, eigenvalues and doubts of a square matrix polynomial, of 1, s, s^2."""
     if not coefficients[0].size:
         empty = np.zeros(0)
@@ -69,7 +69,7 @@ def nearly_singular(share: float) -> str:
     )
 
 
-def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:
+def _of_singular(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
     """Find the eigenvalues of the regular part by deflation, whose ranks are decided by size."""
     pencil = first_order_pencil(coefficients)
     part = finite_part(pencil.A, pencil.E)
@@ -86,7 +86,9 @@ def _of_singular(coefficients: Sequence[Matrix]) -> FoundStructure:
     )
 
 
-def _blocks(coefficients: Sequence[Matrix], counts: ExactCounts, finite: int) -> tuple[tuple[int, ...], int, list[str]]:
+def _blocks(
+    coefficients: Sequence[DenseMatrix], counts: ExactCounts, finite: int
+) -> tuple[tuple[int, ...], int, list[str]]:
     """Return the blocks at infinity that go with the count of finite eigenvalues, the larger index, and doubts.
 
     Beside the exact ones there are those by ranks up to rounding, which stand for what was meant where rounding made

@@ -13,7 +13,7 @@ leaves one of them in doubt the degrees in (20) are counted, exactly.
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.descriptor.exact_counts import exact_counts
 from halfdof_ctrl.descriptor.first_order import time_scale
@@ -94,7 +94,7 @@ def _bounds(model: SecondOrderModel, index: int) -> IntArray:
     return np.asarray(np.maximum(outputs[:, None] + inputs + index - 1, _degrees((model.D, model.Dv, model.Da))))
 
 
-def _degrees(coefficients: tuple[Matrix, ...]) -> IntArray:
+def _degrees(coefficients: tuple[DenseMatrix, ...]) -> IntArray:
     """Return the degree of each entry of a matrix polynomial."""
     degrees = np.full(coefficients[0].shape, NO_GROWTH, dtype=np.int64)
     for power, matrix in enumerate(coefficients):
@@ -136,7 +136,7 @@ def _degree_of_pair(model: SecondOrderModel, i: int, j: int) -> int:
     return counts.degree if counts.is_regular else NO_GROWTH
 
 
-def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[Matrix]:
+def system_pencil(model: SecondOrderModel, outputs: list[int], inputs: list[int]) -> list[DenseMatrix]:
     """Return the coefficients of the system pencil (9) of some outputs and inputs."""
     return [
         np.block([[P, -B[:, inputs]], [F[outputs], D[np.ix_(outputs, inputs)]]])

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.balancing import balancing_powers
 from halfdof_ctrl.descriptor.exact_counts import (
     normal_rank,
@@ -39,7 +39,7 @@ class Zeros:
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
-def invariant_zeros(coefficients: Sequence[Matrix]) -> Zeros:
+def invariant_zeros(coefficients: Sequence[DenseMatrix]) -> Zeros:
     """Find the roots of the greatest common divisor of the largest minors that do not all vanish.
 
     Parameters
@@ -68,7 +68,7 @@ def invariant_zeros(coefficients: Sequence[Matrix]) -> Zeros:
     return _common_roots([_combined(coefficients, rank, seed) for seed in SEEDS], count, at_origin)
 
 
-def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int] | None:
+def _common(coefficients: Sequence[DenseMatrix], rank: int, p: int) -> tuple[int, int] | None:
     """Count the roots that two random combinations of minors have in common, and those at the origin, modulo a prime.
 
     That polynomials without a common root have one modulo p happens once in p.
@@ -90,7 +90,7 @@ def _common(coefficients: Sequence[Matrix], rank: int, p: int) -> tuple[int, int
     return int(common_divisor(polynomials[0], polynomials[1], p).size) - 1, min(zeros)
 
 
-def _combined(coefficients: Sequence[Matrix], rank: int, seed: int) -> list[Matrix]:
+def _combined(coefficients: Sequence[DenseMatrix], rank: int, seed: int) -> list[DenseMatrix]:
     """Add random multiples of the last rows and columns to the first, which leaves a square polynomial."""
     generator = np.random.default_rng(seed)
     unit = mean_frequency(_squared(coefficients))
@@ -105,13 +105,13 @@ def _combined(coefficients: Sequence[Matrix], rank: int, seed: int) -> list[Matr
     return [part[:, :rank] + part[:, rank:] @ across for part in parts]
 
 
-def _squared(coefficients: Sequence[Matrix]) -> list[Matrix]:
+def _squared(coefficients: Sequence[DenseMatrix]) -> list[DenseMatrix]:
     """Fill up with zeros to a square."""
     rows, columns = coefficients[0].shape
     return [np.pad(part, ((0, max(columns - rows, 0)), (0, max(rows - columns, 0)))) for part in coefficients]
 
 
-def _common_roots(squares: Sequence[Sequence[Matrix]], count: int, at_origin: int) -> Zeros:
+def _common_roots(squares: Sequence[Sequence[DenseMatrix]], count: int, at_origin: int) -> Zeros:
     """Pick the roots of the first that the second has too."""
     spectra = [finite_spectrum(square, primes=PRIMES[:1]) for square in squares]
     first, second = (_without_zeros(spectrum.values, spectrum.bounds, at_origin) for spectrum in spectra)

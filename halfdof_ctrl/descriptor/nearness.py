@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
@@ -24,7 +24,7 @@ UNDECIDED = 1e-2  #: a share of rounding above may hide that a model is singular
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles
-def share_of_rounding(coefficients: Sequence[Matrix]) -> float:
+def share_of_rounding(coefficients: Sequence[DenseMatrix]) -> float:
     """Return ``eps rho`` of (34), the least over a few points: below one, no rounding of the entries makes P singular.
 
     Examples

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.linalg
 import scipy.special
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 STAGES = 5
@@ -115,7 +115,7 @@ class RadauStep:
     h: float  #: step [s]
     A: FloatArray
     rows: FloatArray  #: (n, 1) powers of two that equilibrate the rows
-    factors: tuple[tuple[Matrix, Matrix], ...]  #: LU for each eigenvalue of `_upper_half`
+    factors: tuple[tuple[DenseMatrix, DenseMatrix], ...]  #: LU for each eigenvalue of `_upper_half`
 
     @classmethod
     def factorized(cls, E: FloatArray, A: FloatArray, h: float) -> "RadauStep":

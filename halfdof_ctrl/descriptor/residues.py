@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.arrays import DenseMatrix
 
 Residues: TypeAlias = npt.NDArray[np.int64]  #: entries from 0 to p - 1
 Places: TypeAlias = npt.NDArray[np.intp]
@@ -25,7 +25,7 @@ HALF = 16  #: bits of the lower half of a residue
 PANEL = 48  #: columns that are searched for pivots at a time
 
 
-def residues(matrix: Matrix, p: int) -> Residues:
+def residues(matrix: DenseMatrix, p: int) -> Residues:
     """Return the residues of the doubles of a real or complex matrix.
 
     Examples

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.optimize
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 
 FAR = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
@@ -25,11 +25,11 @@ SWEEPS = 3  #: of scaling P(s) at a point, rows and columns in turns
 class ScaledPolynomial:
     """``R_0 + R_1 s + R_2 s^2`` in balanced rows and columns and in its own unit of time."""
 
-    coefficients: tuple[Matrix, Matrix, Matrix]  #: (n, n) of 1, s, s^2
+    coefficients: tuple[DenseMatrix, DenseMatrix, DenseMatrix]  #: (n, n) of 1, s, s^2
     unit: float  #: eigenvalues times this are in rad/s, a power of two
 
     @classmethod
-    def of(cls, coefficients: Sequence[Matrix]) -> "ScaledPolynomial":
+    def of(cls, coefficients: Sequence[DenseMatrix]) -> "ScaledPolynomial":
         """Scale by powers of two, which rounds nothing."""
         R0, R1, R2 = coefficients
         return cls((R0, R1, R2), 1.0).in_unit(mean_frequency(coefficients))
@@ -75,7 +75,7 @@ class ScaledPolynomial:
         return found
 
 
-def mean_frequency(coefficients: Sequence[Matrix]) -> float:
+def mean_frequency(coefficients: Sequence[DenseMatrix]) -> float:
     """Return the geometric mean of the tropical eigenvalues as a power of two, one where there are none.
 
     Examples
@@ -89,7 +89,7 @@ def mean_frequency(coefficients: Sequence[Matrix]) -> float:
     return mean_frequency_between(coefficients, -FAR, FAR)
 
 
-def mean_frequency_between(coefficients: Sequence[Matrix], low: float, high: float) -> float:
+def mean_frequency_between(coefficients: Sequence[DenseMatrix], low: float, high: float) -> float:
     """Return the geometric mean of the tropical eigenvalues between two binary logarithms, one where there are none."""
     sizes = np.abs(np.stack(list(coefficients)))
     logs = np.where(sizes > 0.0, np.log2(np.where(sizes > 0.0, sizes, 1.0)), -ABSENT_WEIGHT)

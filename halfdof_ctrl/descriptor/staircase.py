@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray, powers_of_two
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
 from halfdof_ctrl.descriptor.patterns import Places, diagonal_blocks
 
@@ -25,13 +25,13 @@ ROUNDING_NOISE = 512.0  #: entries within so many of their mean rounding errors 
 class Pencil:
     """``A - s E`` with an estimate of the rounding errors that its entries carry."""
 
-    A: Matrix  #: (k, l)
-    E: Matrix  #: (k, l)
+    A: DenseMatrix  #: (k, l)
+    E: DenseMatrix  #: (k, l)
     dA: FloatArray  #: mean squares of the rounding errors in A
     dE: FloatArray  #: the same in E
 
     @classmethod
-    def exact(cls, A: Matrix, E: Matrix) -> "Pencil":
+    def exact(cls, A: DenseMatrix, E: DenseMatrix) -> "Pencil":
         """Take entries as known to half a unit in the last place."""
         return cls(A, E, (EPS * np.abs(A)) ** 2, (EPS * np.abs(E)) ** 2)
 
@@ -54,13 +54,13 @@ class Pencil:
         scale = rows[:, None] * columns
         return Pencil(self.A * scale, self.E * scale, self.dA * scale**2, self.dE * scale**2)
 
-    def from_left(self, left: Matrix) -> "Pencil":
+    def from_left(self, left: DenseMatrix) -> "Pencil":
         """Multiply by a matrix with orthonormal rows."""
         A, dA = _product(left, self.A, self.dA)
         E, dE = _product(left, self.E, self.dE)
         return Pencil(A, E, dA, dE)
 
-    def from_right(self, right: Matrix) -> "Pencil":
+    def from_right(self, right: DenseMatrix) -> "Pencil":
         """Multiply by a matrix with orthonormal columns."""
         return self.transposed().from_left(right.T).transposed()
 
@@ -133,7 +133,7 @@ def deflated_once(pencil: Pencil) -> Step:
     return Step(rest.from_right(right[:, pivots:]), algebraic, algebraic - pivots, evidence.and_also(second))
 
 
-def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, Evidence]:
+def _range(matrix: DenseMatrix, squares: FloatArray) -> tuple[DenseMatrix, int, Evidence]:
     """Return an orthogonal matrix whose first columns span the range, the rank, and how clear it is."""
     if not matrix.any():
         return np.eye(matrix.shape[0]), 0, Evidence()
@@ -148,7 +148,7 @@ def _range(matrix: Matrix, squares: FloatArray) -> tuple[Matrix, int, Evidence]:
     return left, rank, Evidence(gap, float(pivots[rank - 1] / level))
 
 
-def _product(left: Matrix, matrix: Matrix, squares: FloatArray) -> tuple[Matrix, FloatArray]:
+def _product(left: DenseMatrix, matrix: DenseMatrix, squares: FloatArray) -> tuple[DenseMatrix, FloatArray]:
     """Multiply, follow the rounding errors in the mean, and set what lies within them to zero.
 
     The rows of `left` are known to rounding of one wherever they are not exactly zero.

@@ -9,7 +9,7 @@ import warnings
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, Matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
 from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import equilibrating_powers
@@ -90,7 +90,7 @@ def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
     return _independent_columns(outputs.T), _independent_columns(inputs)
 
 
-def _independent_columns(matrix: Matrix) -> list[int]:
+def _independent_columns(matrix: DenseMatrix) -> list[int]:
     """Pick columns that span the range."""
     rows, columns = equilibrating_powers(np.abs(matrix))
     _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)

@@ -134,7 +134,7 @@ def read_matrices(
     )
 
 
-def _as_stored(raw: RawMatrix, matrix: csc_array) -> Matrix | csc_array:
+def _as_stored(raw: RawMatrix, matrix: csc_array) -> Matrix:
     """Return a matrix dense where its file holds it so: as it is there, or as it was completed."""
     if raw.dense is None:
         return matrix

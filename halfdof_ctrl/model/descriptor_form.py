@@ -14,20 +14,20 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import Matrix, is_zero
+from halfdof_ctrl.base.arrays import ModelMatrix, is_zero
 from halfdof_ctrl.base.sparse_arrays import is_sparse, joined_sparse, locked, unit_like, zeros_like
 
-Rows: TypeAlias = list[list[Matrix]]
+Rows: TypeAlias = list[list[ModelMatrix]]
 
 
 class DescriptorForm(NamedTuple):
     """``E x' = A x + B u``, ``y = C x + D u``; sparse if the model is."""
 
-    E: Matrix  #: (N, N), singular where something has no inertia
-    A: Matrix  #: (N, N)
-    B: Matrix  #: (N, m)
-    C: Matrix  #: (p, N)
-    D: Matrix  #: (p, m)
+    E: ModelMatrix  #: (N, N), singular where something has no inertia
+    A: ModelMatrix  #: (N, N)
+    B: ModelMatrix  #: (N, m)
+    C: ModelMatrix  #: (p, N)
+    D: ModelMatrix  #: (p, m)
 
 
 def descriptor_form(model: Any) -> DescriptorForm:  # noqa: ANN401  # a SecondOrderModel, which imports this module
@@ -84,20 +84,20 @@ def descriptor_form(model: Any) -> DescriptorForm:  # noqa: ANN401  # a SecondOr
 class _Blocks:
     """Rows of blocks, dense or sparse like a pattern."""
 
-    def __init__(self, pattern: Matrix, rows: list[int]) -> None:
+    def __init__(self, pattern: ModelMatrix, rows: list[int]) -> None:
         self.pattern, self.rows = pattern, rows
 
-    def empty(self, columns: list[int]) -> list[list[Matrix]]:
+    def empty(self, columns: list[int]) -> Rows:
         return [[zeros_like(self.pattern, row, column) for column in columns] for row in self.rows]
 
-    def joined(self, blocks: list[list[Matrix]]) -> Matrix:
+    def joined(self, blocks: Rows) -> ModelMatrix:
         return joined_sparse(blocks) if is_sparse(self.pattern) else np.block(blocks)
 
 
-def _form(blocks: _Blocks, E: Rows, A: Rows, B: Rows, C: Rows, D: Matrix) -> DescriptorForm:
+def _form(blocks: _Blocks, E: Rows, A: Rows, B: Rows, C: Rows, D: ModelMatrix) -> DescriptorForm:
     joined = [locked(blocks.joined(part)) for part in (E, A, B, C)]
     return DescriptorForm(joined[0], joined[1], joined[2], joined[3], D)
 
 
-def _negative(matrix: Matrix) -> Matrix:
+def _negative(matrix: ModelMatrix) -> ModelMatrix:
     return locked(-matrix) if is_sparse(matrix) else locked(0.0 - matrix)

@@ -3,13 +3,13 @@
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.arrays import ModelMatrix, as_dense
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
 
 
-def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def null_column_kinds(M: ModelMatrix, C: ModelMatrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Return which columns of M are not null, and which of the others have a column in C that is not."""
     if is_sparse(M):
         inertial, damped = (np.diff(as_sparse(X).indptr) > 0 for X in (M, C))
@@ -18,13 +18,13 @@ def null_column_kinds(M: Matrix, C: Matrix) -> tuple[npt.NDArray[np.bool_], npt.
     return np.asarray(inertial), np.asarray(damped > inertial)
 
 
-def split_in_words(M: Matrix, C: Matrix, K: Matrix) -> str:
+def split_in_words(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix) -> str:
     """Say how many DOFs are inertial, half and static, and the states that follow."""
     inertial, half = null_column_kinds(M, C)
     n, n_inertial, n_half = M.shape[0], int(inertial.sum()), int(half.sum())
     kinds = f"{n_inertial} inertial, {n_half} half, {n - n_inertial - n_half} static"
     if n <= LARGEST_RANKED_REPR:
-        M, C, K = (as_sparse(X).toarray() if is_sparse(X) else X for X in (M, C, K))
+        M, C, K = (as_dense(X) for X in (M, C, K))
         leading = np.where(inertial, M, np.where(half, C, K))
         size = np.abs(leading).max(axis=0)
         if not size.all() or np.linalg.matrix_rank(leading / size) < n:

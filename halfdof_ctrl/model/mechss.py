@@ -6,7 +6,13 @@ from typing import cast
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import MATRIX_DIMENSIONS, Matrix, checked_matrix, checked_square_matrices
+from halfdof_ctrl.base.arrays import (
+    MATRIX_DIMENSIONS,
+    DenseMatrix,
+    ModelMatrix,
+    checked_matrix,
+    checked_square_matrices,
+)
 from halfdof_ctrl.base.names import (
     DERIVATIVE_SUFFIXES,
     FORCE_PREFIX,
@@ -147,14 +153,14 @@ def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int
     return default
 
 
-def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: Matrix) -> Matrix:
+def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: ModelMatrix) -> ModelMatrix:
     """Check one matrix, dense or sparse as `like` is."""
     if value is None or (type(value) in {int, float} and value == 0):
         return zeros_like(like, rows, columns)
     return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
 
 
-def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...]) -> tuple[str, ...]:
+def _input_names(given: Names, columns: Sequence[ModelMatrix], dofs: tuple[str, ...]) -> tuple[str, ...]:
     """Name the inputs; a column that is a unit force on a DOF and the name ``F_<dof>`` belong together."""
     if is_sparse(columns[0]):
         meaning = unit_columns(columns)
@@ -165,7 +171,7 @@ def _input_names(given: Names, columns: Sequence[Matrix], dofs: tuple[str, ...])
 
 
 def _output_names(
-    given: Names, rows: Sequence[Matrix], direct: Sequence[Matrix], dofs: tuple[str, ...]
+    given: Names, rows: Sequence[ModelMatrix], direct: Sequence[ModelMatrix], dofs: tuple[str, ...]
 ) -> tuple[str, ...]:
     """Name the outputs; a row that is a DOF's motion and the motion's name belong together."""
     if is_sparse(rows[0]):
@@ -181,7 +187,7 @@ def _output_names(
     return reconciled_names(given, found, dofs, "output")
 
 
-def _unit_vectors(vectors: Sequence[Matrix]) -> tuple[int, int] | None:
+def _unit_vectors(vectors: Sequence[DenseMatrix]) -> tuple[int, int] | None:
     """Find (which vector, which entry) if all entries are zero but a single one that is 1."""
     places = [(which, int(entry)) for which, vector in enumerate(vectors) for entry in np.flatnonzero(vector)]
     if len(places) == 1 and vectors[places[0][0]][places[0][1]] == 1:

@@ -22,7 +22,7 @@ from typing import Literal, Protocol, TypeAlias, get_args
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.arrays import DenseMatrix, ModelMatrix
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import (
     Names,
@@ -215,7 +215,7 @@ def with_motion_as_input(
     )
 
 
-def _split(X: Coefficients, staying: int, derivative: int) -> tuple[list[Matrix], list[Matrix]]:
+def _split(X: Coefficients, staying: int, derivative: int) -> tuple[list[ModelMatrix], list[ModelMatrix]]:
     """Split the columns of q_g into what stays with it and what goes with its derivative, the input."""
     nothing = 0.0 * X[0]
     stays = [X[k] if k < derivative else nothing for k in range(3)]
@@ -223,11 +223,11 @@ def _split(X: Coefficients, staying: int, derivative: int) -> tuple[list[Matrix]
     return [part[:, :staying] for part in stays], goes
 
 
-def _joined(blocks: list[list[Matrix]]) -> Matrix:
+def _joined(blocks: list[list[ModelMatrix]]) -> ModelMatrix:
     """Join blocks to one matrix, complex only where there are imaginary parts; sparse if a block is."""
     if has_sparse([block for row in blocks for block in row]):
         return joined_sparse(blocks)
-    whole: Matrix = np.block(blocks)
+    whole: DenseMatrix = np.block(blocks)
     return whole if np.iscomplexobj(whole) and whole.imag.any() else whole.real
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, EPS, ComplexArray, Matrix, is_complex, read_only
+from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, EPS, ComplexArray, ModelMatrix, is_complex, read_only
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.names import Names, as_tuple, listed, picked_places
 from halfdof_ctrl.base.sparse_arrays import (
@@ -42,18 +42,18 @@ class SecondOrderModel:
     are those of the user; with SI units and forces as inputs they read as given here.
     """
 
-    M: Matrix  #: (n, n) mass [kg]; all matrices are `scipy.sparse.csc_array` in a sparse model (`is_sparse`)
-    C: Matrix  #: (n, n) damping [N s/m]
-    K: Matrix  #: (n, n) stiffness [N/m]
-    B: Matrix  #: (n, m) what an input does to the equations [N per unit of input]
-    Bv: Matrix  #: (n, m) the same for its first derivative
-    Ba: Matrix  #: (n, m) the same for its second derivative
-    F: Matrix  #: (p, n) displacements in the outputs
-    G: Matrix  #: (p, n) velocities in the outputs
-    H: Matrix  #: (p, n) accelerations in the outputs
-    D: Matrix  #: (p, m) direct term
-    Dv: Matrix  #: (p, m) the same for the first derivative of the inputs
-    Da: Matrix  #: (p, m) the same for the second derivative of the inputs
+    M: ModelMatrix  #: (n, n) mass [kg]; all matrices are `scipy.sparse.csc_array` in a sparse model (`is_sparse`)
+    C: ModelMatrix  #: (n, n) damping [N s/m]
+    K: ModelMatrix  #: (n, n) stiffness [N/m]
+    B: ModelMatrix  #: (n, m) what an input does to the equations [N per unit of input]
+    Bv: ModelMatrix  #: (n, m) the same for its first derivative
+    Ba: ModelMatrix  #: (n, m) the same for its second derivative
+    F: ModelMatrix  #: (p, n) displacements in the outputs
+    G: ModelMatrix  #: (p, n) velocities in the outputs
+    H: ModelMatrix  #: (p, n) accelerations in the outputs
+    D: ModelMatrix  #: (p, m) direct term
+    Dv: ModelMatrix  #: (p, m) the same for the first derivative of the inputs
+    Da: ModelMatrix  #: (p, m) the same for the second derivative of the inputs
     dofs: tuple[str, ...]  #: names of the n DOFs
     inputs: tuple[str, ...]  #: names of the m inputs
     outputs: tuple[str, ...]  #: names of the p outputs
@@ -76,7 +76,7 @@ class SecondOrderModel:
         """Letters of the complex matrices."""
         return tuple([letter for letter, matrix in zip(LETTERS, self._matrices(), strict=True) if is_complex(matrix)])
 
-    def _matrices(self) -> tuple[Matrix, ...]:
+    def _matrices(self) -> tuple[ModelMatrix, ...]:
         return (self.M, self.C, self.K, self.B, self.Bv, self.Ba, self.F, self.G, self.H, self.D, self.Dv, self.Da)
 
     def __call__(self, s: npt.ArrayLike, squeeze: bool | None = None) -> ComplexArray:  # noqa: FBT001  # as in control

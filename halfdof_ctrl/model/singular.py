@@ -18,7 +18,7 @@ import scipy.linalg
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import EPS, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, DenseMatrix, powers_of_two
 from halfdof_ctrl.base.errors import SingularPencilError
 from halfdof_ctrl.base.names import listed
 
@@ -75,7 +75,7 @@ class NullSpaces:
     smallest: float  #: singular value of the matrix in scaled rows and columns, relative to the largest
 
 
-def null_spaces(P: Matrix) -> NullSpaces:
+def null_spaces(P: DenseMatrix) -> NullSpaces:
     """Find the null spaces of a square matrix that is singular."""
     left, values, right = scipy.linalg.svd(_scaled(P))
     dimension = max(1, int(np.count_nonzero(values <= NULL * values.size * values[0])))
@@ -87,7 +87,7 @@ def null_spaces(P: Matrix) -> NullSpaces:
     )
 
 
-def causes(null: NullSpaces, coefficients: Sequence[Matrix], dofs: Sequence[str]) -> list[Cause]:
+def causes(null: NullSpaces, coefficients: Sequence[DenseMatrix], dofs: Sequence[str]) -> list[Cause]:
     """Put each group into words that a mechanical engineer knows.
 
     Parameters
@@ -114,7 +114,7 @@ def causes(null: NullSpaces, coefficients: Sequence[Matrix], dofs: Sequence[str]
     return found
 
 
-def _scaled(P: Matrix) -> Matrix:
+def _scaled(P: DenseMatrix) -> DenseMatrix:
     """Bring the largest entries of rows and columns near one."""
     for _ in range(SCALING_SWEEPS):
         P = P * np.sqrt(powers_of_two(np.abs(P).max(axis=1, initial=0.0)))[:, None]
@@ -122,7 +122,7 @@ def _scaled(P: Matrix) -> Matrix:
     return P
 
 
-def _groups(basis: Matrix) -> tuple[Group, ...]:
+def _groups(basis: DenseMatrix) -> tuple[Group, ...]:
     """Split a space into the parts that share no coordinate, each given by the coordinates it moves."""
     _, _, order = scipy.linalg.qr(basis.conj().T, pivoting=True, mode="economic")
     pivots = order[: basis.shape[1]]
@@ -138,7 +138,7 @@ def _groups(basis: Matrix) -> tuple[Group, ...]:
     return tuple(sorted(groups, key=min))
 
 
-def _kind_of_unknowns(group: Group, null: NullSpaces, coefficients: Sequence[Matrix]) -> Kind:
+def _kind_of_unknowns(group: Group, null: NullSpaces, coefficients: Sequence[DenseMatrix]) -> Kind:
     members = sorted(group)
     if len(members) == 1:
         return "unused" if any(matrix[members].any() for matrix in coefficients) else "unattached"
@@ -150,7 +150,7 @@ def _kind_of_unknowns(group: Group, null: NullSpaces, coefficients: Sequence[Mat
     return "floating" if _is_constant(np.vstack([matrix[:, members] for matrix in coefficients])) else "free"
 
 
-def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
+def _kind_of_equations(group: Group, coefficients: Sequence[DenseMatrix]) -> Kind:
     members = sorted(group)
     if len(members) == 1:
         return "empty"
@@ -158,7 +158,7 @@ def _kind_of_equations(group: Group, coefficients: Sequence[Matrix]) -> Kind:
     return "identical" if len(members) == PAIR and _is_constant(rows.T) else "dependent"
 
 
-def _is_constant(columns: Matrix) -> bool:
+def _is_constant(columns: DenseMatrix) -> bool:
     """Return whether columns of K, C and M on top of each other depend, so that a null vector holds at every s."""
     values = scipy.linalg.svdvals(_scaled(columns))
     return bool(values[-1] <= NULL * max(columns.shape) * values[0])

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, ModelMatrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.progress import progress
@@ -28,7 +28,7 @@ from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
 
-Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
+Coefficients: TypeAlias = Sequence[ModelMatrix]  #: of 1, s, s^2, all of one shape
 
 
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point

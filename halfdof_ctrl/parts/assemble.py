@@ -16,7 +16,6 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -207,12 +206,12 @@ def _joined(
     if count:
         empty = sparse_zeros(count, count)
         zero = sparse_zeros(count, len(kept))
-        borders = [zero, zero, cast("Matrix", G)]
+        borders = [zero, zero, G]
         squares = [
-            as_sparse(joined_sparse([[cast("Matrix", X), cast("Matrix", csc_array(border.T))], [border, empty]]))
+            as_sparse(joined_sparse([[X, csc_array(border.T)], [border, empty]]))
             for X, border in zip(squares, borders, strict=True)
         ]
-    wide = csc_array(joined_sparse([[cast("Matrix", T), sparse_zeros(T.shape[0], count)]]))
+    wide = csc_array(joined_sparse([[T, sparse_zeros(T.shape[0], count)]]))
     signals = assembled_signals(parts, wide, tuple(names), len(kept))
     dense = not any(model.is_sparse for model in models)
     matrices: dict[str, Any] = dict(zip(LETTERS, squares, strict=True)) | signals

@@ -290,9 +290,9 @@ def _realized(
     size = r * count
     matrices: dict[str, Matrix] = {
         "M": joined_sparse([[model.M, sparse_zeros(n, size)], [sparse_zeros(size, n), sparse_zeros(size, size)]]),
-        "C": joined_sparse([[model.C, sparse_zeros(n, size)], [sparse_zeros(size, n), cast("Matrix", dampers)]]),
-        "K": joined_sparse([[cast("Matrix", whole), cast("Matrix", coupling)],
-                            [cast("Matrix", csc_array(coupling.T)), cast("Matrix", inner)]]),
+        "C": joined_sparse([[model.C, sparse_zeros(n, size)], [sparse_zeros(size, n), dampers]]),
+        "K": joined_sparse([[whole, coupling],
+                            [csc_array(coupling.T), inner]]),
     }  # fmt: skip
     m, p = len(model.inputs), len(model.outputs)
     for letter in ("B", "Bv", "Ba"):

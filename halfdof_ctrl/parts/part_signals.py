@@ -1,12 +1,11 @@
 """Inputs and outputs of an assembly: forces on and motions of its DOFs, then what else the parts have."""
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array, csc_array, csr_array
 
-from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.base.names import FORCE_PREFIX, force_names, motions
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, joined_sparse, sparse_zeros
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -26,17 +25,17 @@ def assembled_signals(
     m, p = left + len(inputs), left + len(outputs)
     for letter in ("B", "Bv", "Ba"):
         whole = block_diagonal([getattr(model, letter) for model in models])[:, input_places]
-        own = cast("Matrix", csc_array(T.T @ whole))
-        first = cast("Matrix", unit) if letter == "B" else sparse_zeros(size, left)
+        own = csc_array(T.T @ whole)
+        first = unit if letter == "B" else sparse_zeros(size, left)
         result[letter] = joined_sparse([[first, own]])
     for letter in ("F", "G", "H"):
         rows = csr_array(block_diagonal([getattr(model, letter) for model in models]))[output_places]
-        own = cast("Matrix", csc_array(rows @ T))
-        first = cast("Matrix", csc_array(unit.T)) if letter == "F" else sparse_zeros(left, size)
+        own = csc_array(rows @ T)
+        first = csc_array(unit.T) if letter == "F" else sparse_zeros(left, size)
         result[letter] = joined_sparse([[first], [own]])
     for letter in ("D", "Dv", "Da"):
         rows = csr_array(block_diagonal([getattr(model, letter) for model in models]))[output_places]
-        part = cast("Matrix", csc_array(csc_array(rows)[:, input_places]))
+        part = csc_array(csc_array(rows)[:, input_places])
         result[letter] = joined_sparse(
             [[sparse_zeros(left, left), sparse_zeros(left, m - left)], [sparse_zeros(p - left, left), part]]
         )

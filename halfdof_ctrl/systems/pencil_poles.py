@@ -10,7 +10,7 @@ are a better finite eigenvalue and what rounding of the entries moves it.
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray, powers_of_two
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import energy_system
@@ -43,7 +43,7 @@ def pencil_poles(model: SecondOrderModel) -> BoundedPoles:
     return BoundedPoles(np.where(np.abs(values) <= bounds, 0.0, values), bounds)
 
 
-def _improved(parts: tuple[Matrix, Matrix, Matrix], value: complex) -> tuple[complex, float]:
+def _improved(parts: tuple[DenseMatrix, DenseMatrix, DenseMatrix], value: complex) -> tuple[complex, float]:
     """Return a better eigenvalue and its bound."""
     step, data = _first_order(parts, value)
     for _ in range(STEPS):
@@ -56,7 +56,7 @@ def _improved(parts: tuple[Matrix, Matrix, Matrix], value: complex) -> tuple[com
     return value, data + abs(step)
 
 
-def _first_order(parts: tuple[Matrix, Matrix, Matrix], s: complex) -> tuple[complex, float]:
+def _first_order(parts: tuple[DenseMatrix, DenseMatrix, DenseMatrix], s: complex) -> tuple[complex, float]:
     K, C, M = parts
     size: FloatArray = np.abs(K) + abs(s) * np.abs(C) + abs(s) ** 2 * np.abs(M)
     rows = powers_of_two(size.max(axis=1, initial=0.0))

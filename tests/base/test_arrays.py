@@ -8,7 +8,15 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, checked_matrix, is_complex, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.arrays import (
+    DENSE_ROW_LIMIT,
+    as_dense,
+    checked_matrix,
+    is_complex,
+    read_only,
+    unit_matrix,
+    zero_matrix,
+)
 from halfdof_ctrl.base.errors import MatrixError
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -148,3 +156,10 @@ def test_locked_array_is_the_same_array() -> None:
     array = np.zeros(3)
     assert read_only(array) is array
     assert not array.flags.writeable
+
+
+def test_matrix_of_either_kind_is_given_as_an_array() -> None:
+    """An array as it is, without a copy; compressed columns with the zeros that they do not store."""
+    array = np.array([[0.0, 2.0], [0.0, -1.0]])
+    assert as_dense(array) is array
+    assert_array_equal(as_dense(scipy.sparse.csc_array(array)), array)

@@ -147,8 +147,8 @@ def test_joining_and_picking_equal_numpy(seed: int) -> None:
     assert_array_equal(dense(joined_sparse(blocks)), whole)
     picked = generator.integers(0, 3, 4).tolist()
     beside, below = ([scipy.sparse.csc_array(part) for part in parts] for parts in ((a, a), (c, a)))
-    assert_array_equal(dense(picked_beside(beside, picked)), np.hstack([a, a])[:, picked])  # type: ignore[arg-type]
-    assert_array_equal(dense(picked_below(below, picked)), np.vstack([c, a])[picked])  # type: ignore[arg-type]
+    assert_array_equal(dense(picked_beside(beside, picked)), np.hstack([a, a])[:, picked])
+    assert_array_equal(dense(picked_below(below, picked)), np.vstack([c, a])[picked])
     by_row, by_column = largest_by_row_and_column(scipy.sparse.csc_array(a))
     assert_array_equal(by_row, np.abs(a).max(axis=1))
     assert_array_equal(by_column, np.abs(a).max(axis=0))

@@ -93,6 +93,6 @@ def test_dense_signals_beside_a_sparse_pencil_are_taken() -> None:
     """As the dynamic stiffness does."""
     P = tuple(csc_array(matrix) for matrix in (np.diag([2.0, 3.0]), np.zeros((2, 2)), np.eye(2)))
     signal, zero = np.array([[1.0], [0.0]]), np.zeros((1, 1))
-    values = quadratic_transfer(P, (signal,) * 3, (signal.T,) * 3, (zero,) * 3, POINTS)  # type: ignore[arg-type]
+    values = quadratic_transfer(P, (signal,) * 3, (signal.T,) * 3, (zero,) * 3, POINTS)
     factor = 1.0 + POINTS + POINTS**2
     assert_allclose(values[0, 0], factor**2 / (2.0 + POINTS**2), rtol=1e-12)

@@ -11,7 +11,7 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array, csc_array, csr_array
+from scipy.sparse import coo_array, csr_array
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix
 
@@ -101,7 +101,7 @@ def logarithmic_scaling(coefficients: FloatArray) -> tuple[FloatArray, FloatArra
     return solution[:n], solution[n : 2 * n], float(solution[-1])
 
 
-def evening_logs(matrix: Matrix | csc_array, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
+def evening_logs(matrix: Matrix, settled: float = SETTLED) -> tuple[FloatArray, FloatArray]:
     """Return the logarithms of the row and column factors that bring all entries of one matrix nearest to one.
 
     As `logarithmic_scaling` without time, and quicker for large matrices.
@@ -137,7 +137,7 @@ def unit_free_factors(matrix: FloatArray) -> tuple[FloatArray, FloatArray]:
     return rows * down, columns * across
 
 
-def time_log(coefficients: Sequence[Matrix | csc_array], settled: float = SETTLED) -> float:
+def time_log(coefficients: Sequence[Matrix], settled: float = SETTLED) -> float:
     """Return the logarithm of the time factor of `logarithmic_scaling`, for dense or sparse coefficients.
 
     Examples
@@ -184,7 +184,7 @@ def _evening(
     return (by_row - times @ columns) / in_row, columns
 
 
-def _entries(matrix: Matrix | csc_array) -> tuple[IndexArray, IndexArray, FloatArray]:
+def _entries(matrix: Matrix) -> tuple[IndexArray, IndexArray, FloatArray]:
     """Return the rows, columns and sizes of the nonzero entries."""
     entries = coo_array(matrix)
     present = np.flatnonzero(entries.data)

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, Matrix, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.arrays import EPS, DenseMatrix, FloatArray, IndexArray, read_only, unit_matrix, zero_matrix
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilError, UncertainRankError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -293,5 +293,5 @@ def _probe(model: SecondOrderModel) -> SecondOrderModel:
     )
 
 
-def _beside(left: Matrix, right: Matrix) -> Matrix:
+def _beside(left: DenseMatrix, right: DenseMatrix) -> DenseMatrix:
     return read_only(np.hstack([left, right]))

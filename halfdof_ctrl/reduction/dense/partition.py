@@ -11,7 +11,7 @@ from typing import Literal
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, IndexArray, Matrix, unit_matrix
+from halfdof_ctrl.base.arrays import DenseMatrix, FloatArray, IndexArray, unit_matrix
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.reduction.algebra.blocks import cancelled
 from halfdof_ctrl.reduction.method.evidence import LightMasses, RankDecision
@@ -84,7 +84,7 @@ class DofPartition:
         unit = unit_matrix(self.order.size)
         return unit if self.in_order else np.asarray(unit[:, self.order])
 
-    def times_basis(self, matrix: Matrix, first: int, stop: int | None) -> FloatArray:
+    def times_basis(self, matrix: DenseMatrix, first: int, stop: int | None) -> FloatArray:
         """Return the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns.
 
         Entries that are rounding of a sum whose terms cancel are zero.

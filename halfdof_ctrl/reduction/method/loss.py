@@ -245,4 +245,4 @@ def _at(coefficients: Sequence[Matrix], s: complex, columns: IndexArray) -> Comp
 def _as_it_is(matrix: Matrix) -> Matrix:
     """Return a dense matrix with few entries as a sparse one."""
     few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < SPARSE * matrix.size
-    return csc_array(matrix) if few else matrix  # type: ignore[return-value]
+    return csc_array(matrix) if few else matrix

@@ -21,6 +21,7 @@ from halfdof_ctrl import (
     save_model,
     truncate_modes,
 )
+from halfdof_ctrl.base.arrays import as_dense
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -92,7 +93,7 @@ def test_all_modes_up_to_twice_the_band_are_kept(f_max: float) -> None:
     model = frame_model()
     small = truncate_modes(model, f_max=f_max)
     free = [place for place, name in enumerate(model.dofs) if name not in small.kept]
-    M, _, K = (matrix.toarray()[np.ix_(free, free)] for matrix in (model.M, model.C, model.K))  # type: ignore[attr-defined]
+    M, _, K = (as_dense(matrix)[np.ix_(free, free)] for matrix in (model.M, model.C, model.K))
     frequencies = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True)) / (2.0 * np.pi)
     assert_allclose(small.mode_frequencies, frequencies[frequencies < 2.0 * f_max], rtol=1e-7)
     assert small.band == pytest.approx((f_max / 100.0, f_max))

@@ -14,6 +14,7 @@ from scipy.sparse import block_diag, coo_array, csc_array, csr_matrix, diags_arr
 from scipy.sparse.linalg import splu
 
 from halfdof_ctrl import ExactReduction, SecondOrderModel, exact_reduction, mech2ss, mechss
+from halfdof_ctrl.base.arrays import as_dense
 from halfdof_ctrl.base.errors import (
     HalfdofError,
     ImproperError,
@@ -310,6 +311,6 @@ def _noting(used: list[str], name: str, method: Callable[..., Any]) -> Callable[
 
 def _solved(structure: Any, model: SecondOrderModel, s: complex) -> npt.NDArray[np.complex128]:  # noqa: ANN401
     """Evaluate the transfer function by scipy's factorization of P(s) as it stands."""
-    B, F, G = (matrix.toarray() for matrix in (model.B, model.F, model.G))  # type: ignore[attr-defined]
+    B, F, G = (as_dense(matrix) for matrix in (model.B, model.F, model.G))
     P = csc_array(structure.K + s * structure.C + s**2 * structure.M)
     return np.asarray((F + s * G) @ splu(P).solve(B.astype(np.complex128)))
