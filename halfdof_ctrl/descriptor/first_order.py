@@ -93,4 +93,4 @@ def _balances(sizes: FloatArray) -> FloatArray:
 
 def typical_frequency(model: SecondOrderModel) -> float:
     """Return a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
-    return time_scale((model.K, model.C, model.M))
+    return time_scale(model.quadratics.P)

@@ -34,7 +34,7 @@ def require_regular_sparse(model: SecondOrderModel) -> None:
     SingularPencilError
         ``P(s)`` is singular to working precision at three generic points.
     """
-    coefficients = [as_sparse(matrix) for matrix in (model.K, model.C, model.M)]
+    coefficients = [as_sparse(matrix) for matrix in model.quadratics.P]
     gamma, pencil = _time_scale(coefficients), SparsePencil.on_one_pattern(coefficients)
     for point in GENERIC_POINTS:
         ratio, null = _smallest_singular_value(pencil, gamma * point)
@@ -95,7 +95,7 @@ def require_regular(model: SecondOrderModel) -> None:
     if model.is_sparse:
         require_regular_sparse(model)
         return
-    coefficients = (model.K, model.C, model.M)
+    coefficients = model.quadratics.P
     share = share_of_rounding(coefficients)
     if share <= UNDECIDED:
         return

@@ -7,21 +7,17 @@ random right-hand side, which is solved beside the others, shows that P(s) is ne
 the working precision (`exact_products`).
 """
 
-from collections.abc import Sequence
-from typing import TypeAlias
-
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, random_right_side, refined
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
-
-Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
 

@@ -11,7 +11,7 @@ with residuals summed term by term (`exact_products`), and (DATA) says what the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -26,10 +26,8 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_e
 from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
-
-Coefficients: TypeAlias = Sequence[Matrix]  #: of 1, s, s^2, all of one shape
-
 
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)

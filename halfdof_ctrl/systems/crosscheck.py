@@ -203,8 +203,7 @@ def _compare_transfer(
     found, rounding = system(points)
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
-    quadratics = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
-    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING_OF_A / EPS)
+    by_equations = quadratic_rounding(*model.quadratics, points) * (ROUNDING_OF_A / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
     worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {complex_in_words(points[k])}"

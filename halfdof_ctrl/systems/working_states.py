@@ -199,7 +199,7 @@ def refined_response(model: SecondOrderModel, points: ComplexArray) -> ComplexAr
     >>> refined_response(mechss([[0]], [[0]], [[4]]), np.array([1j])).ravel().tolist()
     [(0.25+0j)]
     """
-    exact = ExactPolynomial([model.K, model.C, model.M])
+    exact = ExactPolynomial(model.quadratics.P)
     shape = (len(model.outputs), len(model.inputs), points.size)
     values = np.full(shape, complex(np.nan, np.nan))
     for k, s in enumerate(points.tolist()):

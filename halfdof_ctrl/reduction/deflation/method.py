@@ -256,7 +256,7 @@ def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPe
         dofs=_names(model, np.array(sorted(frozenset().union(*null.unknowns)), dtype=np.intp)),
         equations=_names(model, np.array(sorted(frozenset().union(*null.equations)), dtype=np.intp)),
         fact="to working precision",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
+        causes=causes(null, model.quadratics.P, model.dofs),
     )
 
 

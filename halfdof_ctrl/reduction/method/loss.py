@@ -107,7 +107,7 @@ def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
 
 def equation_of_motion(model: SecondOrderModel) -> ExactPolynomial:
     """Return P(s) = K + C s + M s^2 for residuals in twice the working precision."""
-    return ExactPolynomial([_as_it_is(matrix) for matrix in (model.K, model.C, model.M)])
+    return ExactPolynomial([_as_it_is(matrix) for matrix in model.quadratics.P])
 
 
 def loss_points(A: FloatArray) -> ComplexArray:
@@ -158,13 +158,13 @@ def _lost_at(
     q = np.empty((len(model.dofs), chosen.size), dtype=np.complex128)
     q.real = stored.motion_at(x.real.copy(), [power.real * unit for power in powers], 0)
     q.imag = stored.motion_at(x.imag.copy(), [power.imag * unit for power in powers], 0)
-    rest = equation.residual(s, q, _at((model.B, model.Bv, model.Ba), s, chosen))
-    value = _at((model.D, model.Dv, model.Da), s, chosen) + _seen(model, s, q)
+    rest = equation.residual(s, q, _at(model.quadratics.B, s, chosen))
+    value = _at(model.quadratics.D, s, chosen) + _seen(model, s, q)
     said = np.asarray(output.X @ x)
     for power, part in zip(powers, output.U, strict=False):
         said = said + power * part[:, chosen]
     missed = np.asarray(value - said + _seen(model, s, stored.answer(states, rest)))
-    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate((model.K, model.C, model.M)))
+    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate(model.quadratics.P))
     generator = np.random.default_rng(0)
     rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(ROUNDINGS)]
     data = [np.abs(_seen(model, s, stored.answer(states, force.astype(np.complex128)))) for force in rounded]
@@ -230,7 +230,7 @@ def _derivatives(A: FloatArray) -> int:
 
 def _seen(model: SecondOrderModel, s: complex, q: ComplexArray) -> ComplexArray:
     """Return ``F(s) q``."""
-    parts = [s**power * np.asarray(part @ q) for power, part in enumerate((model.F, model.G, model.H))]
+    parts = [s**power * np.asarray(part @ q) for power, part in enumerate(model.quadratics.F)]
     return np.asarray(parts[0] + parts[1] + parts[2])
 
 

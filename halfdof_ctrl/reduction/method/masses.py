@@ -51,7 +51,7 @@ def slowest_speed(model: SecondOrderModel) -> float:
     speeds = own_speeds(model)
     if (speeds > 0.0).any():
         return float(np.sqrt(speeds[speeds > 0.0].min()))
-    return float(np.exp2(time_log([model.K, model.C, model.M])))
+    return float(np.exp2(time_log(model.quadratics.P)))
 
 
 def spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:

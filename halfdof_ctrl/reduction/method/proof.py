@@ -178,13 +178,13 @@ def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tupl
 
 def scaled_pencil(model: SecondOrderModel) -> tuple[ScaledRows, Units, ScaledPencil]:
     """Return the rows of a model in scaled units, the units, and the pencil to be proved against."""
-    rows, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    rows, units = scaled_rows(np.stack(model.quadratics.P), np.stack(model.quadratics.B))
     n = len(model.dofs)
     powers = np.arange(3)[:, None, None]
     pencil = ScaledPencil(
         P=rows.coefficients[:, :, :n],
         B=rows.coefficients[:, :, n:],
-        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
-        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+        F=units.by_time(np.stack(model.quadratics.F) * units.columns, powers),
+        D=units.by_time(np.stack(model.quadratics.D) * units.inputs, powers),
     )
     return rows, units, pencil

@@ -47,7 +47,7 @@ class SparseEquation:
         inertial, half = partition.of_kind(INERTIAL), partition.of_kind(HALF)
         columns = [partition.mapped(matrix, own) for matrix, own in ((K, inertial), (K, half), (C, inertial))]
         states = csc_array(hstack(columns, format="csc"))
-        forces = [as_sparse(matrix) for matrix in (model.B, model.Bv, model.Ba)]
+        forces = [as_sparse(matrix) for matrix in model.quadratics.B]
         while len(forces) > 1 and forces[-1].nnz == 0:
             forces.pop()
         scaled = [
@@ -169,9 +169,9 @@ class SparseDisplacement:
         remedy = "Select the outputs and inputs that matter: model.select(inputs=[...], outputs=[...])."
         require_room(p, max(m, 1), "D", remedy)
         require_room(p, max(N, 1), "C", remedy)
-        parts = [model.F, model.G, model.H]
+        parts = model.quadratics.F
         signal, size = self._combined(as_sparse(joined_sparse([[part] for part in parts])))
-        direct = trimmed(tuple([as_sparse(matrix).toarray() for matrix in (model.D, model.Dv, model.Da)]))
+        direct = trimmed(tuple([as_sparse(matrix).toarray() for matrix in model.quadratics.D]))
         total, bound = Signal(np.zeros((p, N)), direct), Signal(np.zeros((p, N)), ())
         A, B = np.abs(self.A), self._input_sizes()[0]
         for order, part in enumerate(parts):

@@ -23,7 +23,7 @@ DETERMINANT = 1e-9  # of integer matrices up to 5 x 5 after a few row operations
 
 def relaxed_model(model: SecondOrderModel) -> tuple[RowSystem, Relaxed]:
     """Relax a model's equations."""
-    system = system_of(np.stack([model.K, model.C, model.M]))
+    system = system_of(np.stack(model.quadratics.P))
     return system, relaxed(system, USUAL)
 
 

@@ -23,9 +23,7 @@ MEASURED = 0.5  # a loss is a figure of one digit
 
 def pencil_of(model: SecondOrderModel) -> ScaledPencil:
     """Scale a model's quadratics; outputs are all scaled displacements."""
-    rows, _ = scaled_rows(
-        np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
-    )
+    rows, _ = scaled_rows(np.stack(model.quadratics.P).astype(float), np.stack(model.quadratics.B).astype(float))
     n, m = len(model.dofs), model.B.shape[1]
     F = np.concatenate([np.eye(n)[None], np.zeros((2, n, n))])
     return ScaledPencil(P=rows.coefficients[:, :, :n], B=rows.coefficients[:, :, n:], F=F, D=np.zeros((3, n, m)))
