@@ -6,6 +6,7 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import mechss
+from halfdof_ctrl.base.sparse_arrays import as_sparse
 
 ROUNDING = 1e-13
 POINT = 0.3 + 1.7j
@@ -18,7 +19,7 @@ def test_quadratics_give_the_transfer_function(is_sparse: bool) -> None:  # noqa
     model = mechss(csc_array(M) if is_sparse else M, C, K)
     model = model.prescribe_motion("q1", inputs=["q1", "F_q0"], outputs=["R_q1", "q0_dot", "q0_ddot"])
     P, B, F, D = (
-        sum(POINT**power * (part.toarray() if is_sparse else part) for power, part in enumerate(parts))
+        np.tensordot(POINT ** np.arange(3), np.stack([as_sparse(part).toarray() for part in parts]), axes=1)
         for parts in model.quadratics
     )
     assert_allclose(F @ np.linalg.solve(P, B) + D, model(POINT), rtol=ROUNDING)
