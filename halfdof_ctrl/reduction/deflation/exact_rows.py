@@ -27,7 +27,7 @@ from halfdof_ctrl.reduction.deflation.row_system import (
     Caution,
     Elimination,
     RowSystem,
-    levelled,
+    level_scaled,
     shifts_of,
     tight_places,
 )
@@ -83,7 +83,7 @@ class ExactRows(RowSystem):
         sources, columns = group[0].sources, group[0].columns
         if sources.size == 0:
             return np.zeros((0, len(group)), dtype=object), 1
-        part = levelled(self, offsets, offsets.tight(self.matrix), sources, columns)
+        part = level_scaled(self, offsets, offsets.tight(self.matrix), sources, columns)
         _, _, order = scipy.linalg.qr(part.matrix, mode="economic", pivoting=True)
         chosen = columns[np.sort(order[: sources.size])]
         dependent = np.array([item.row for item in group], dtype=np.intp)

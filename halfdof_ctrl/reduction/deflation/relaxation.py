@@ -22,7 +22,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold
 from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks, structural_offsets
-from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, levelled
+from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, level_scaled
 
 RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
 PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
@@ -114,7 +114,7 @@ class _Block:
         tol: float | None,
     ) -> "_Block":
         place = np.ix_(rows, columns)
-        scaled = levelled(system, offsets, J, rows, columns)
+        scaled = level_scaled(system, offsets, J, rows, columns)
         factors = scaled.rows[:, None] * scaled.columns
         variance = offsets.tight(system.variance[:, :, : system.size])[place] * factors**2
         matrix, row_factors = scaled.matrix, scaled.rows

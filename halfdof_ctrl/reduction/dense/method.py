@@ -11,7 +11,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR, LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
@@ -212,8 +212,7 @@ def _singular_error(
     model: SecondOrderModel, partition: DofPartition, W: FloatArray, leading: LeadingMatrix
 ) -> SingularLeadingMatrixError:
     """Make the refusal of a singular W, naming the DOFs of its null vector."""
-    rows, columns = equilibrating_factors(W)
-    _, _, right = scipy.linalg.svd(W * rows[:, None] * columns)
+    _, _, right = scipy.linalg.svd(max_scaling(W).of(W))
     null = np.abs(right[-1])
     concerned = partition.T[:, null > NULL_VECTOR_SHARE * null.max()].any(axis=1)
     dofs = tuple([model.dofs[index] for index in np.flatnonzero(concerned).tolist()])

@@ -12,7 +12,7 @@ from halfdof_ctrl.base.arrays import FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import connected_columns
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import logarithmic_scaling
+from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
@@ -60,7 +60,7 @@ def rounding_of_solve(
     scaled to be the same in any units; of the largest one among unknowns that W connects, since others have neither
     errors nor units in common.
     """
-    row_logs, _, _ = logarithmic_scaling(np.stack(model.quadratics.P))
+    row_logs, _, _ = log_scaling_with_time(np.stack(model.quadratics.P))
     W = leading_columns(model, partition)
     scale = 1.0 / np.abs(np.exp2(row_logs)[:, None] * W).max(axis=0)[:, None]
     parts = connected_columns(W)

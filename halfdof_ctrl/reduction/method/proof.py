@@ -18,7 +18,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import balanced, balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.integers import as_integers, log_determinant
-from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 from halfdof_ctrl.reduction.method.units import ScaledRows, Units, scaled_rows
 
@@ -74,9 +74,9 @@ class ScaledPencil:
 
     def _log_determinant(self, s: complex) -> float:
         P, _ = self.at(s)
-        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
-        scale = float(np.log(rows).sum() + np.log(columns).sum())
-        return float(np.linalg.slogdet(P * rows[:, None] * columns)[1]) - scale
+        scaling = max_scaling(np.abs(P), even=2.0)
+        scale = float(np.log(scaling.rows).sum() + np.log(scaling.columns).sum())
+        return float(np.linalg.slogdet(scaling.of(P))[1]) - scale
 
     def losses(self, equations: StateEquations) -> "Losses":
         """Compare the state equations, balanced, with direct solves at the points on the axis."""
@@ -86,7 +86,7 @@ class ScaledPencil:
         size, error, worst = np.zeros(m), np.zeros(m), 0.0
         for s in AXIS:
             P, B = self.at(s)
-            rows, columns = (factors[:, None] for factors in equilibrating_factors(np.abs(P), even=2.0))
+            rows, columns = (factors[:, None] for factors in max_scaling(np.abs(P), even=2.0))
             matrix = P * rows * columns.T
             try:
                 direct = columns * np.linalg.solve(matrix, rows * B)
@@ -131,8 +131,7 @@ class ScaledPencil:
 
     def _scaled(self, s: complex) -> ComplexArray:
         P, _ = self.at(s)
-        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
-        return np.asarray(P * rows[:, None] * columns)
+        return np.asarray(max_scaling(np.abs(P), even=2.0).of(P))
 
     def _smallest(self, s: complex) -> float:
         values = np.linalg.svd(self._scaled(s), compute_uv=False)

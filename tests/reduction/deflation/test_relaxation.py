@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import SecondOrderModel, hydromount
 from halfdof_ctrl.reduction.deflation.offsets import structural_offsets
 from halfdof_ctrl.reduction.deflation.relaxation import RANK_TOLERANCE, UNCLEAR, Relaxed, independent_rows, relaxed
-from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, levelled, unit_free
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, level_scaled, unit_free
 from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 from support import exact
 from support.mechanisms import blade, derivatives, hanging_chain, rod
@@ -162,7 +162,7 @@ def test_decisions_are_the_same_in_any_units(seed: int, size: int, powers: list[
 
 @given(seed=SEEDS, size=st.integers(1, 4), powers=POWERS)
 def test_unit_free_scaling_is_the_same_in_any_units(seed: int, size: int, powers: list[int]) -> None:
-    """What rows, columns and time still lack makes J the same, levelled or not."""
+    """What rows, columns and time still lack makes J the same, level or not."""
     P = drawn(seed, size)
     columns, rows = 10.0 ** np.array(powers[:size]), 10.0 ** np.array(powers[4 : 4 + size])
     speed = (10.0 ** powers[8]) ** np.arange(3.0)
@@ -171,7 +171,7 @@ def test_unit_free_scaling_is_the_same_in_any_units(seed: int, size: int, powers
     assume(found is not None)
     assert found is not None
     systems = system_of(P), system_of(P * columns * rows[:, None] * speed[:, None, None])
-    for scaling in (unit_free, levelled):
+    for scaling in (unit_free, level_scaled):
         one, other = (scaling(part, found, found.tight(part.matrix), every, every) for part in systems)
         assert_allclose(other.matrix, one.matrix, rtol=DETERMINANT)
         assert_allclose(one.matrix, found.tight(systems[0].matrix) * one.rows[:, None] * one.columns, rtol=ROUNDOFF)
