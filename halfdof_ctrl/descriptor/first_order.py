@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, Matrix
-from halfdof_ctrl.descriptor.balancing import balancing_powers, equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import balancing_powers, scaling_powers
 from halfdof_ctrl.descriptor.patterns import connected_parts
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -59,7 +59,7 @@ def _low_rank_factors(matrix: Matrix) -> tuple[Matrix, Matrix]:
 
 
 def _factors_of_part(part: Matrix) -> tuple[Matrix, Matrix]:
-    down, across = equilibrating_powers(np.abs(part))
+    down, across = scaling_powers(np.abs(part))
     left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
     rank = int(np.count_nonzero(values > ZERO_PIVOT * max(part.shape) * values[0]))
     left, right = left[:, :rank], right[:rank]

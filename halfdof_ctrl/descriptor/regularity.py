@@ -57,7 +57,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
         factors = PointFactors.of(pencil, s, ordering, threshold)
         matrix, lu, known = factors.matrix, cast("Any", factors.lu), 1.0
     except RuntimeError:  # exactly singular
-        matrix, _, _ = pencil.equilibrated_at(s)
+        matrix, _, _ = pencil.scaled_at(s)
         nudge = diags_array(PENCIL_NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
         lu, known = splu(csc_array(matrix + nudge)), 0.0
     generator = np.random.default_rng(0)

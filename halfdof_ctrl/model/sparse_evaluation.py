@@ -211,7 +211,7 @@ class SparsePencil:
         n = self.indptr.size - 1
         return csc_array((total, self.indices, self.indptr), shape=(n, n))
 
-    def equilibrated_at(self, s: complex) -> tuple[SparseMatrix, FloatArray, FloatArray]:
+    def scaled_at(self, s: complex) -> tuple[SparseMatrix, FloatArray, FloatArray]:
         """Give P(s) with the largest entries of its rows and columns near one, and the powers of two that do it."""
         P = self.at(s)
         by_row, _ = largest_by_row_and_column(P)
@@ -236,7 +236,7 @@ class SparsePencil:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointFactors:
-    """P(s), equilibrated by powers of two and factorized."""
+    """P(s), scaled by powers of two and factorized."""
 
     lu: SuperLU
     matrix: SparseMatrix  #: what was factorized
@@ -254,7 +254,7 @@ class PointFactors:
         RuntimeError
             It is exactly singular.
         """
-        P, down, across = pencil.equilibrated_at(s)
+        P, down, across = pencil.scaled_at(s)
         symmetric = threshold < 1.0
         lu = splu(P, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
