@@ -28,9 +28,7 @@ from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 AGREEMENT = 1e-12  #: relative difference between two evaluations up to which both are right
-SOUND_RESPONSE = (
-    1e-10  #: relative error of energy coordinates at tested points up to which a large model stays with them
-)
+SOUND_RESPONSE = 1e-10  #: relative error at tested points up to which a large model stays with the states it has
 FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
 MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
 

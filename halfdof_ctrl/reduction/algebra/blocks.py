@@ -11,8 +11,8 @@ from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, unit_free_scaling
 
 RANK_TOLERANCE = 16 * EPS  #: times the block's size; singular values below are null
-ENTRIES = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
-UNCLEAR = 1e3  #: singular values above that and below this times it are split at the widest gap
+ENTRY_NOISE = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
+UNCLEAR_RANK = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
 
 
@@ -55,12 +55,12 @@ def split_block(block: FloatArray, tol: float | None) -> BlockSplit:
     bound = tol
     if bound is None:
         rounding = max(block.shape) * RANK_TOLERANCE
-        bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR)
+        bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR_RANK)
     rank = int(np.count_nonzero(values > bound * values[0]))
     spread = float(values[0] / values[rank - 1]) if rank else 1.0
     speck = 4 * max(block.shape) * EPS * spread
     clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-    noise = ENTRIES * max(block.shape) * float(values[0])
+    noise = ENTRY_NOISE * max(block.shape) * float(values[0])
     mixing = scaling.columns[:, None] * clean
     return BlockSplit(values, rank, float(bound * values[0]), noise, mixing, scaling.columns, spread)
 

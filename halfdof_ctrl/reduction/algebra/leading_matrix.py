@@ -7,17 +7,17 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling
 
-SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
-FEWEST = 256  #: n in that bound at least
+SINGULAR_RCOND = EPS  #: times n: W is singular below this reciprocal condition number
+LEAST_SIZE = 256  #: n in that bound at least
 PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number is not scaled, nor its state space compared ...
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
-SMALL = 60  #: DOFs that are few
-MOST_STEPS = 16  #: of the iteration for the best scaling
+FEW_DOFS = 60  #: DOFs that are few
+MOST_SCALING_STEPS = 16  #: of the iteration for the best scaling
 LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
-GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
+SCALING_GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -74,11 +74,11 @@ class LeadingMatrix:
         size, inverse = np.abs(self.scaled), np.abs(dgetri(self.factors, self.pivots)[0])
         u, least = np.ones(len(size)), np.inf
         best = u, u
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_SCALING_STEPS):
             across = u @ size
             following = across @ inverse
             largest = float((following / u).max())
-            if not largest < GAIN * least:
+            if not largest < SCALING_GAIN * least:
                 break
             best, least = (u, 1.0 / across), largest
             u = np.maximum(following / following.max(), LEAST_FACTOR)
@@ -95,7 +95,7 @@ class LeadingMatrix:
 
         Columns of W that combine DOFs are rounded themselves, which even a small W may show.
         """
-        return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
+        return self.rcond < max(len(self.factors), LEAST_SIZE) * SINGULAR_RCOND
 
     def singular_values(self) -> FloatArray:
         """Return the singular values of the matrix that was factorized."""
@@ -126,7 +126,7 @@ class LeadingMatrix:
 
 def plainly_regular(size: int) -> float:
     """Return the reciprocal condition number from which on W of so many DOFs needs no closer look."""
-    return PLAINLY_REGULAR_IF_SMALL if size <= SMALL else PLAINLY_REGULAR
+    return PLAINLY_REGULAR_IF_SMALL if size <= FEW_DOFS else PLAINLY_REGULAR
 
 
 def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:

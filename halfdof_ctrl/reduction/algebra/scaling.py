@@ -25,10 +25,11 @@ IndexArray: TypeAlias = npt.NDArray[np.intp]
 
 MOST_PASSES = 12  #: each pass halves the spread's exponent; 12 take it from 2^2000 to below 2
 EVEN = 2.0**10  #: rows and columns whose largest entries are between 1/1024 and 1024 are left as they are
-FLAT = 1e-12  #: of the largest singular value: directions in which the least squares leave the factors open
-MOST_STEPS = 2000  #: of conjugate gradients for the logarithmic factors of one matrix
-SETTLED = 1e-20  #: of the first residual, squared, at which they stop
-SMALL = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
+OPEN_DIRECTION = 1e-12  #: of the largest singular value: directions in which the least squares leave the factors open
+MOST_GRADIENT_STEPS = 2000  #: of conjugate gradients for the logarithmic factors of one matrix
+FULLY_SETTLED = 1e-20  #: of the first residual, squared, at which they stop
+ROUGHLY_SETTLED = 1e-8  #: the same where masses are compared, or a large matrix is scaled once more
+DENSE_PATTERN_ROWS = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
 
 
 class Scaling(NamedTuple):
@@ -147,11 +148,13 @@ def log_scaling_with_time(coefficients: FloatArray) -> tuple[FloatArray, FloatAr
     square = np.block([[np.diag(count.sum(axis=1)), count], [count.T, np.diag(count.sum(axis=0))]])
     normal = np.block([[square, time[:, None]], [time[None, :], np.array([[float((power**2).sum())]])]])
     right = -np.concatenate([np.bincount(i, logs, n), np.bincount(j, logs, n), [float(power @ logs)]])
-    solution = np.linalg.lstsq(normal, right, rcond=FLAT)[0]
+    solution = np.linalg.lstsq(normal, right, rcond=OPEN_DIRECTION)[0]
     return solution[:n], solution[n : 2 * n], float(solution[-1])
 
 
-def log_scaling(matrix: Matrix | SparseMatrix, settled: float = SETTLED, *, powers_of_two: bool = False) -> Scaling:
+def log_scaling(
+    matrix: Matrix | SparseMatrix, settled: float = FULLY_SETTLED, *, powers_of_two: bool = False
+) -> Scaling:
     """Return the row and column factors that bring all entries of one matrix nearest to one.
 
     As `log_scaling_with_time` without time, and quicker for large matrices.
@@ -180,7 +183,7 @@ def log_scaling(matrix: Matrix | SparseMatrix, settled: float = SETTLED, *, powe
     return Scaling(*[np.exp2(np.round(log) if powers_of_two else log) for log in logs])
 
 
-def unit_free_scaling(matrix: Matrix | SparseMatrix, settled: float = SETTLED) -> Scaling:
+def unit_free_scaling(matrix: Matrix | SparseMatrix, settled: float = FULLY_SETTLED) -> Scaling:
     """Return row and column factors that make all entries of a matrix even, and then the largest ones near one.
 
     The scaled matrix is the same whatever the units were. `settled` as in `log_scaling`.
@@ -189,7 +192,7 @@ def unit_free_scaling(matrix: Matrix | SparseMatrix, settled: float = SETTLED) -
     return first.then(level_scaling(first.of_sparse(matrix) if isinstance(matrix, csc_array) else first.of(matrix)))
 
 
-def time_log(coefficients: Sequence[Matrix | SparseMatrix], settled: float = SETTLED) -> float:
+def time_log(coefficients: Sequence[Matrix | SparseMatrix], settled: float = FULLY_SETTLED) -> float:
     """Return the logarithm of the time factor of `log_scaling_with_time`, for dense or sparse coefficients.
 
     Examples
@@ -207,7 +210,7 @@ def time_log(coefficients: Sequence[Matrix | SparseMatrix], settled: float = SET
         rows, columns = _scaling_logs(i, j, values, coefficients[0].shape, settled)
         uneven.append(values + rows[i] + columns[j])
     square = float(uneven[1] @ uneven[1])
-    return -float(uneven[0] @ uneven[1]) / square if square > FLAT * powers.size else 0.0
+    return -float(uneven[0] @ uneven[1]) / square if square > OPEN_DIRECTION * powers.size else 0.0
 
 
 def _scaling_logs(
@@ -215,7 +218,7 @@ def _scaling_logs(
 ) -> tuple[FloatArray, FloatArray]:
     """Minimize the squares of ``logs + r_i + c_j`` by conjugate gradients on c (Curtis and Reid, 1972)."""
     pattern = csr_array((np.ones(i.size), (i, j)), shape=shape)
-    times = np.asarray(pattern.toarray()) if max(shape) <= SMALL else pattern
+    times = np.asarray(pattern.toarray()) if max(shape) <= DENSE_PATTERN_ROWS else pattern
     back = times.T
     in_row, in_column = (np.maximum(np.bincount(k, minlength=n), 1) for k, n in zip((i, j), shape, strict=True))
     by_row = -np.bincount(i, logs, shape[0])
@@ -223,8 +226,8 @@ def _scaling_logs(
     residual = -np.bincount(j, logs, shape[1]) - back @ (by_row / in_row)
     step = residual / in_column
     first = left = float(residual @ step)
-    for _ in range(MOST_STEPS):
-        if left <= max(settled * first, SETTLED):
+    for _ in range(MOST_GRADIENT_STEPS):
+        if left <= max(settled * first, FULLY_SETTLED):
             break
         moved = in_column * step - back @ ((times @ step) / in_row)
         length = left / float(step @ moved)

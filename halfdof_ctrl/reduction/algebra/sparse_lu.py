@@ -20,23 +20,20 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, SYMMETRIC_SHARE
 from halfdof_ctrl.base.sparse_products import exact_residual, times
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling, max_scaling
+from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, Scaling, log_scaling, max_scaling
 
-PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
-WIDTH = 8  #: right-hand sides worked at a time
 REFINED = 2.0**-46  #: componentwise backward error of the test solution above which solutions are corrected once
 ILL_CONDITIONED = 2.0**-24  #: reciprocal condition number below which solutions are corrected once
 UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
-SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
-SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
-SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
+SINGULAR_SPARSE_RCOND = 16 * EPS  #: reciprocal condition number of a singular W; n eps for n below 16
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
-DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
-CHEAP = 200  #: ... of a matrix of up to so many rows
+DOUBTFUL_RCOND = 1e-6  #: reciprocal condition number below which another scaling is tried ...
+FEW_ROWS = 200  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
@@ -63,13 +60,13 @@ class SparseLU:
         conditioned is scaled as the dense leading matrix is.
         """
         first = cls._scaled(matrix, max_scaling(matrix))
-        if matrix.shape[0] <= CHEAP and first.rcond < DOUBTFUL:
+        if matrix.shape[0] <= FEW_ROWS and first.rcond < DOUBTFUL_RCOND:
             best = LeadingMatrix.factorized(matrix.toarray())
             if best.rows is not None and best.columns is not None:
                 return _better(first, cls._scaled(matrix, Scaling(best.rows, best.columns)))
         if not first.is_singular:
             return first
-        return _better(first, cls._scaled(matrix, log_scaling(matrix, SETTLED, powers_of_two=True)))
+        return _better(first, cls._scaled(matrix, log_scaling(matrix, ROUGHLY_SETTLED, powers_of_two=True)))
 
     @classmethod
     def _scaled(cls, matrix: SparseMatrix, scaling: Scaling) -> "SparseLU":
@@ -83,7 +80,7 @@ class SparseLU:
     @property
     def is_singular(self) -> bool:
         """Whether W is singular to working precision."""
-        return self.rcond < min(self.rows.size * float(np.finfo(float).eps), SINGULAR)
+        return self.rcond < min(self.rows.size * EPS, SINGULAR_SPARSE_RCOND)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""

@@ -28,8 +28,8 @@ from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, unit
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 from halfdof_ctrl.reduction.method.units import Units
 
-PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
-CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
+STATE_PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
+CERTAIN_COEFFICIENT = 1e4  #: mean rounding errors beyond which a coefficient is not one
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -137,7 +137,7 @@ def rounding_in_model_units(realization: Realization, units: Units, columns: Flo
     """
     scaled = realization.equations
     q = scaled.displacement
-    known = [np.minimum(columns, CERTAIN / relative * error) for error in realization.errors]
+    known = [np.minimum(columns, CERTAIN_COEFFICIENT / relative * error) for error in realization.errors]
     sizes_of_inputs = tuple([np.maximum(np.abs(part), size) for part, size in zip(q.U, known, strict=False)])
     sizes = StateEquations(
         A=np.abs(scaled.A),
@@ -172,7 +172,7 @@ class Chain:
             columns = columns[::-1]
             part = unit_free(system, offsets, J, rows, columns).matrix
             part = part / np.abs(part).max(axis=1, keepdims=True, initial=0.0)
-            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, PIVOT_SHARE)
+            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, STATE_PIVOT_SHARE)
             determined.append(np.sort(columns[picked]))
         return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
 

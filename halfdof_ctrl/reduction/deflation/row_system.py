@@ -15,7 +15,7 @@ from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, level_scaling
 from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
 from halfdof_ctrl.reduction.method.units import ScaledRows
 
-DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
+DOUBTFUL_ENTRY = 1e5  #: entries above the caution and below this times it may be either
 
 
 @dataclass(frozen=True, slots=True)
@@ -148,4 +148,4 @@ def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolA
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(row != 0.0, np.abs(row) / np.sqrt(square), 0.0)
-    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL))
+    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL_ENTRY))

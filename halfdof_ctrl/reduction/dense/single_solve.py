@@ -8,7 +8,7 @@ others, sections 2.1 to 2.3.
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, is_zero, read_only, unit_matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import connected_columns
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
@@ -16,7 +16,7 @@ from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
-ROUNDING = 32 * np.finfo(float).eps  #: times n: what a solution of (3) is known to, of its largest scaled unknown
+SOLVE_ROUNDING = 32 * EPS  #: times n: what a solution of (3) is known to, of its largest scaled unknown
 
 
 def leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatArray:
@@ -87,7 +87,7 @@ def rounding_of_solve(
         statics.append(known_to[:, moving:] @ size[moving:])
     shift = rates[1] + A @ rates[2]
     return Rounding(
-        relative=ROUNDING * len(model.dofs),
+        relative=SOLVE_ROUNDING * len(model.dofs),
         A=A,
         B=rates[0] + A @ shift,
         displacement=Signal(X, (statics[0] + X @ shift, statics[1] + X @ rates[2], statics[2])),

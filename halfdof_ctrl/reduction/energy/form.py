@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, FloatArray, IndexArray, is_zero, read_only
+from halfdof_ctrl.base.arrays import EPS, LARGEST_DENSE_COPY, FloatArray, IndexArray, is_zero, read_only
 from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -132,7 +132,7 @@ def _mass_error(model: SecondOrderModel, parts: Parts) -> EnergyFormError:
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(scale[:, None] * M * scale)
     dofs = [model.dofs[parts.inertial[j]] for j in np.argsort(-np.abs(vectors[:, 0]), kind="stable")[:8].tolist()]
-    if values[0] < -len(M) * np.finfo(float).eps:
+    if values[0] < -len(M) * EPS:
         return indefinite_error("M", dofs)
     msg = (
         f"There are no energy coordinates in terms of DOFs: the mass among DOFs {', '.join(dofs)} is singular "

@@ -24,10 +24,10 @@ Parts = Mapping[str, SparseMatrix]  #: matrices of a model by their letters
 MARGIN = 2.0  #: modes with b held are kept up to this factor above the highest frequency of the band
 MOST_MODES = 2000  #: that are kept
 MOST_KEPT = 1000  #: DOFs that are kept
-MOST_ENTRIES = 2**28  #: of the dense matrix of motions that the model is projected on (2 GB)
+MOST_MOTION_ENTRIES = 2**28  #: of the dense matrix of motions that the model is projected on (2 GB)
 LOCAL = 6  #: DOFs of an input or output up to which these are kept; one that touches more gets a static correction
 DEPENDENT = 1e-10  #: of the largest eigenvalue of their energies: combinations of static corrections below are none
-SPECK = 1e-14  #: of the largest motion of a DOF that follows a kept one: motions below are rounding
+MOTION_SPECK = 1e-14  #: of the largest motion of a DOF that follows a kept one: motions below are rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -79,7 +79,7 @@ def _kept_dofs(parts: Parts) -> tuple[IndexArray, SparseMatrix]:
     if damped.size <= MOST_KEPT:
         kept[damped] = True
     loads = csc_array(hstack(spread, format="csc"))
-    count, most = int(np.count_nonzero(kept)), min(MOST_KEPT, MOST_ENTRIES // (4 * kept.size))
+    count, most = int(np.count_nonzero(kept)), min(MOST_KEPT, MOST_MOTION_ENTRIES // (4 * kept.size))
     if max(count, loads.shape[1]) > most:
         msg = (
             f"{count} DOFs of inputs, outputs and dampers would be kept, and {loads.shape[1]} inputs and outputs are "
@@ -111,7 +111,7 @@ def _modes(stiffness: ShiftedStiffness | None, f_max: float | None, n_modes: int
     """Find the modes with the kept DOFs held: as many as wanted, or all up to beyond the band."""
     if stiffness is None:
         return Modes(np.zeros(0), np.zeros((0, 0)))
-    most = min(MOST_MODES, MOST_ENTRIES // (2 * stiffness.K.shape[0]))
+    most = min(MOST_MODES, MOST_MOTION_ENTRIES // (2 * stiffness.K.shape[0]))
     count = (n_modes or 0) if f_max is None else count_below(stiffness, 2.0 * np.pi * MARGIN * f_max)
     if count > most:
         which = "" if f_max is None else f", all below {MARGIN * f_max:.4g} Hz, twice f_max"
@@ -129,7 +129,7 @@ def _following(parts: Parts, stiffness: ShiftedStiffness | None, kept: IndexArra
         return np.zeros((0, kept.size))
     coupling = csc_array(parts["K"] - stiffness.sigma * parts["M"])[:, kept]
     follow = -stiffness.solve_sparse(csc_array(coupling.tocsr()[inner]), "kept DOFs")
-    follow[np.abs(follow) <= SPECK * np.abs(follow).max(axis=0, initial=0.0)] = 0.0
+    follow[np.abs(follow) <= MOTION_SPECK * np.abs(follow).max(axis=0, initial=0.0)] = 0.0
     return follow
 
 

@@ -19,7 +19,7 @@ import scipy.linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -30,7 +30,7 @@ ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
 UNDAMPED = 1e-6  #: of its size: the real part of a pole that counts as undamped here
 SILENT = 1e-3  #: of the largest residue over its pole's size: resonances that show less in a channel are no part of it
 OVERDAMPED = 0.7  #: damping ratio of what is no resonance
-UNIT = float(np.finfo(float).eps) / 2.0
+UNIT = EPS / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import block_diag, csc_array, diags_array, eye_array
 
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra import sparse_lu
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling
@@ -63,7 +64,7 @@ def test_condition_is_estimated_from_below(seed: int) -> None:
 @pytest.mark.parametrize("way", range(3))
 def test_every_way_of_pivoting_gives_the_solution(way: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Minimum degree without and with a threshold, and columns with partial pivoting."""
-    monkeypatch.setattr(sparse_lu, "PIVOTINGS", sparse_lu.PIVOTINGS[way:])
+    monkeypatch.setattr(sparse_lu, "PIVOTINGS", PIVOTINGS[way:])
     K = space_frame(3, 2, 3, 1).K
     lu = SparseLU.factorized(K)
     right = np.ones((K.shape[0], 1))
