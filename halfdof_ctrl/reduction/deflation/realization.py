@@ -1,4 +1,4 @@
-"""State space of any regular pencil: the road for index above one.
+"""State space of any regular pencil: the method for index above one.
 
 `relaxation` turns ``P(s) q = B(s) u`` into equations whose tight coefficients J, of the powers d_j - c_i of the
 offsets (15), are nonsingular. Equation i and its first c_i derivatives then hold. At level l = 0, 1, ...
@@ -55,7 +55,7 @@ class _Uncertain:
     def zeros(cls, *shape: int) -> "_Uncertain":
         return cls(np.zeros(shape), np.zeros(shape))
 
-    def add_product(self, place: IndexArray, left: "_Uncertain", right: "_Uncertain") -> None:
+    def subtract_product(self, place: IndexArray, left: "_Uncertain", right: "_Uncertain") -> None:
         """Subtract ``left @ right`` from some rows."""
         self.value[place] -= left.value @ right.value
         sizes = left.value**2
@@ -217,7 +217,7 @@ class Chain:
                 order = k + times - level
                 if order < len(found.value) and T[k, chosen, :n].any():
                     left = _Uncertain(T[k, chosen, :n], V[k, chosen, :n])
-                    right.add_product(place, left, _Uncertain(found.value[order], found.square[order]))
+                    right.subtract_product(place, left, _Uncertain(found.value[order], found.square[order]))
                 first = N + m * order
                 right.value[place, first : first + m] += T[k, chosen, n:]
                 right.square[place, first : first + m] += V[k, chosen, n:]

@@ -26,7 +26,7 @@ from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks
 from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, level_scaled
 
 ROW_PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
-UNCLEAR_RANK = 100.0  #: singular values above the bound and below this times it may be either
+UNCLEAR_TIGHT_RANK = 100.0  #: singular values above the bound and below this times it may be either
 SHORTER_MULTIPLIER = 4.0  #: root mean square errors within which a shorter multiplier is as good
 FINEST_DYADIC = 10  #: multipliers within rounding of a multiple of 2^-10 are taken as that
 
@@ -127,7 +127,7 @@ class _Block:
             variance = variance * weights[:, None] ** 2
             values = scipy.linalg.svdvals(matrix)
         if tol is None:
-            bound = gap_threshold(values, bound, bound * UNCLEAR_RANK)
+            bound = gap_threshold(values, bound, bound * UNCLEAR_TIGHT_RANK)
         decision = BlockDecision(
             unknowns=columns,
             singular_values=values,

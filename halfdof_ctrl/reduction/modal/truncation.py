@@ -34,7 +34,7 @@ from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
-from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.reduction.modal.craig_bampton import KEPT_MODES_MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 from halfdof_ctrl.reduction.modal.projection import IMAGINARY_STIFFNESS, projected
 from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resonance_errors
@@ -209,7 +209,7 @@ def _band_top(parts: Parts, omega: FloatArray, f_max: float | None) -> float:
     if f_max is not None:
         return f_max
     if omega.size and omega[-1] > 0.0:
-        return float(omega[-1] / (2.0 * np.pi * MARGIN))
+        return float(omega[-1] / (2.0 * np.pi * KEPT_MODES_MARGIN))
     stiffness, mass = np.abs(parts["K"].diagonal()), np.abs(parts["M"].diagonal())
     speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
     return float(np.sqrt(speeds.max(initial=0.0) or 1.0) / (2.0 * np.pi))

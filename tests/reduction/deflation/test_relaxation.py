@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from halfdof_ctrl import SecondOrderModel, hydromount
 from halfdof_ctrl.reduction.algebra.blocks import RANK_TOLERANCE
 from halfdof_ctrl.reduction.deflation.offsets import structural_offsets
-from halfdof_ctrl.reduction.deflation.relaxation import UNCLEAR_RANK, Relaxed, independent_rows, relaxed
+from halfdof_ctrl.reduction.deflation.relaxation import UNCLEAR_TIGHT_RANK, Relaxed, independent_rows, relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, level_scaled, unit_free
 from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 from support import exact
@@ -134,7 +134,7 @@ def test_singular_values_in_doubt_are_parted_at_the_widest_gap() -> None:
     for doubtful, rank in ((2 * rounding, 2), (15 * rounding, 4)):
         M = rotation @ np.diag([1.0, 0.1, doubtful, 0.75 * doubtful]) @ rotation.T
         decision = relaxed(system_of([np.eye(4), np.zeros((4, 4)), M]), Caution(24.0, 0.0)).decisions[0]
-        assert decision.singular_values[2] < UNCLEAR_RANK * rounding * decision.singular_values[0]
+        assert decision.singular_values[2] < UNCLEAR_TIGHT_RANK * rounding * decision.singular_values[0]
         assert decision.rank == rank
 
 
