@@ -11,6 +11,7 @@ from scipy.sparse import csc_array, issparse
 from halfdof_ctrl.base.errors import MatrixError
 
 EPS = float(np.finfo(float).eps)  #: spacing of floating-point numbers at one
+UNIT_ROUNDOFF = EPS / 2.0  #: relative error of rounding to the nearest number
 IndexArray: TypeAlias = npt.NDArray[np.intp]
 FloatArray: TypeAlias = npt.NDArray[np.float64]
 ComplexArray: TypeAlias = npt.NDArray[np.complex128]

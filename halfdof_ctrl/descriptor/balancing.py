@@ -7,11 +7,11 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-BALANCING_SWEEPS = 10  #: equilibration passes over rows and columns
-FREE_FACTOR = 1e-9  #: fixes the common factor of rows and columns that the equilibration leaves open
+BALANCING_SWEEPS = 10  #: scaling passes over rows and columns
+FREE_FACTOR = 1e-9  #: fixes the common factor of rows and columns that the scaling leaves open
 
 
-def equilibrating_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
+def scaling_powers(size: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return powers of two for rows and columns that bring their largest entries near one.
 
     Rows and columns are divided by the square roots of their maxima in turns, zero ones left alone.

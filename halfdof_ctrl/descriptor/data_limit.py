@@ -28,12 +28,7 @@ def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -
         Entries known to their last digit do not determine it to 1e-6 of its value.
     """
     points = np.asarray(1j * frequencies, dtype=np.complex128)
-    coefficients = (
-        (model.K, model.C, model.M),
-        (model.B, model.Bv, model.Ba),
-        (model.F, model.G, model.H),
-        (model.D, model.Dv, model.Da),
-    )
+    coefficients = model.quadratics
     values, growth = transfer_and_growth(*coefficients, points)
     suspect = np.flatnonzero((growth > SUSPECT_GROWTH) & np.isfinite(growth))
     if suspect.size:

@@ -88,7 +88,7 @@ def infinite_part(A: DenseMatrix, E: DenseMatrix) -> InfinitePart:
     >>> part.steps, part.blocks
     ((2, 1), (2, 1))
     """
-    staircase = deflated(Pencil.exact(A, E).equilibrated())
+    staircase = deflated(Pencil.exact(A, E).scaled())
     return InfinitePart(steps=staircase.steps, evidence=staircase.evidence)
 
 
@@ -104,7 +104,7 @@ def _by_blocks(pencil: Pencil) -> FinitePart | None:
     waiting = [block.transposed() if block.E.shape[0] < block.E.shape[1] else block for block in waiting]
     while waiting:
         block = waiting.pop()
-        step = deflated_once(block.equilibrated())
+        step = deflated_once(block.scaled())
         evidence = evidence.and_also(step.evidence)
         if step.redundant > block.E.shape[0] - block.E.shape[1]:
             return None
@@ -139,7 +139,7 @@ def _both_ways(pencil: Pencil) -> FinitePart:
         (pencil, (rows - rank, columns - rank)),
         (pencil.transposed(), (columns - rank, rows - rank)),
     ):
-        first = deflated(turned.equilibrated())
+        first = deflated(turned.scaled())
         second = deflated(first.pencil.transposed())
         is_sound = (first.redundant, second.redundant) == surplus
         is_clear = first.evidence.and_also(second.evidence).margin > CLEAR_MARGIN
@@ -157,7 +157,7 @@ def _both_ways(pencil: Pencil) -> FinitePart:
 
 def _normal_rank(pencil: Pencil) -> int:
     """Find the rank at generic points, the largest of a few."""
-    scaled = pencil.equilibrated()
+    scaled = pencil.scaled()
     ranks = []
     for s in GENERIC_POINTS:
         values = scipy.linalg.svdvals(scaled.A - s * scaled.E)

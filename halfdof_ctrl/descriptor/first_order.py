@@ -17,7 +17,7 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, DenseMatrix, FloatArray
-from halfdof_ctrl.descriptor.balancing import balancing_powers, equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import balancing_powers, scaling_powers
 from halfdof_ctrl.descriptor.patterns import connected_parts
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -59,7 +59,7 @@ def _low_rank_factors(matrix: DenseMatrix) -> tuple[DenseMatrix, DenseMatrix]:
 
 
 def _factors_of_part(part: DenseMatrix) -> tuple[DenseMatrix, DenseMatrix]:
-    down, across = equilibrating_powers(np.abs(part))
+    down, across = scaling_powers(np.abs(part))
     left, values, right = scipy.linalg.svd(part * down[:, None] * across, full_matrices=False)
     rank = int(np.count_nonzero(values > ZERO_PIVOT * max(part.shape) * values[0]))
     left, right = left[:, :rank], right[:rank]
@@ -93,4 +93,4 @@ def _balances(sizes: FloatArray) -> FloatArray:
 
 def typical_frequency(model: SecondOrderModel) -> float:
     """Return a frequency [rad/s], a power of two, at which the model's rows balance in the mean."""
-    return time_scale((model.K, model.C, model.M))
+    return time_scale(model.quadratics.P)

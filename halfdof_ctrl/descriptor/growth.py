@@ -89,9 +89,9 @@ def _undecided(model: SecondOrderModel, unclear: npt.NDArray[np.bool_], size: Fl
 
 def _bounds(model: SecondOrderModel, index: int) -> IntArray:
     """Bound the growth by the degrees of B(s), F(s), D(s) and the growth of P(s)^-1."""
-    inputs = _degrees((model.B, model.Bv, model.Ba)).max(axis=0)
-    outputs = _degrees((model.F, model.G, model.H)).max(axis=1)
-    return np.asarray(np.maximum(outputs[:, None] + inputs + index - 1, _degrees((model.D, model.Dv, model.Da))))
+    inputs = _degrees(model.quadratics.B).max(axis=0)
+    outputs = _degrees(model.quadratics.F).max(axis=1)
+    return np.asarray(np.maximum(outputs[:, None] + inputs + index - 1, _degrees(model.quadratics.D)))
 
 
 def _degrees(coefficients: tuple[DenseMatrix, ...]) -> IntArray:
@@ -109,14 +109,9 @@ def _by_circle(
     most = int(bound.max())
     count = max(FEWEST_POINTS, 2 ** int(np.ceil(np.log2(4 * (most + 1)))))
     largest = float(np.abs(eigenvalues).max(initial=0.0))
-    radius = RADIUS * largest if largest > 0.0 else time_scale((model.K, model.C, model.M))
+    radius = RADIUS * largest if largest > 0.0 else time_scale(model.quadratics.P)
     points = radius * np.exp(2j * np.pi * np.arange(count) / count)
-    coefficients = (
-        (model.K, model.C, model.M),
-        (model.B, model.Bv, model.Ba),
-        (model.F, model.G, model.H),
-        (model.D, model.Dv, model.Da),
-    )
+    coefficients = model.quadratics
     with np.errstate(invalid="ignore"):
         parts = np.abs(np.fft.fft(quadratic_transfer(*coefficients, points), axis=2) / count)[:, :, 1 : most + 1]
     rounding = quadratic_rounding(*coefficients, points).max(axis=2, keepdims=True)

@@ -114,7 +114,7 @@ class RadauStep:
 
     h: float  #: step [s]
     A: FloatArray
-    rows: FloatArray  #: (n, 1) powers of two that equilibrate the rows
+    rows: FloatArray  #: (n, 1) powers of two that scale the rows to even sizes
     factors: tuple[tuple[DenseMatrix, DenseMatrix], ...]  #: LU for each eigenvalue of `_upper_half`
 
     @classmethod

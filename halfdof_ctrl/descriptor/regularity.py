@@ -34,7 +34,7 @@ def require_regular_sparse(model: SecondOrderModel) -> None:
     SingularPencilError
         ``P(s)`` is singular to working precision at three generic points.
     """
-    coefficients = [as_sparse(matrix) for matrix in (model.K, model.C, model.M)]
+    coefficients = [as_sparse(matrix) for matrix in model.quadratics.P]
     gamma, pencil = _time_scale(coefficients), SparsePencil.on_one_pattern(coefficients)
     for point in GENERIC_POINTS:
         ratio, null = _smallest_singular_value(pencil, gamma * point)
@@ -57,7 +57,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
         factors = PointFactors.of(pencil, s, ordering, threshold)
         matrix, lu, known = factors.matrix, cast("Any", factors.lu), 1.0
     except RuntimeError:  # exactly singular
-        matrix, _, _ = pencil.equilibrated_at(s)
+        matrix, _, _ = pencil.scaled_at(s)
         nudge = diags_array(PENCIL_NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
         lu, known = splu(csc_array(matrix + nudge)), 0.0
     generator = np.random.default_rng(0)
@@ -95,7 +95,7 @@ def require_regular(model: SecondOrderModel) -> None:
     if model.is_sparse:
         require_regular_sparse(model)
         return
-    coefficients = (model.K, model.C, model.M)
+    coefficients = model.quadratics.P
     share = share_of_rounding(coefficients)
     if share <= UNDECIDED:
         return

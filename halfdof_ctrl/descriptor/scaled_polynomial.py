@@ -13,7 +13,7 @@ import numpy as np
 import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 
 FAR = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
 ABSENT_WEIGHT = 1e9  #: of a place without entry, in the logarithm
@@ -38,7 +38,7 @@ class ScaledPolynomial:
         """Take another unit of time, relative to this one, and balance rows and columns in it."""
         R0, R1, R2 = self.coefficients
         R1, R2 = R1 * unit, R2 * unit * unit  # unit^2 may overflow
-        rows, columns = equilibrating_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
+        rows, columns = scaling_powers(np.maximum(np.maximum(np.abs(R0), np.abs(R1)), np.abs(R2)))
         scale = rows[:, None] * columns
         return ScaledPolynomial((R0 * scale, R1 * scale, R2 * scale), self.unit * unit)
 

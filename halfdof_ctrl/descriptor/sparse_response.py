@@ -56,12 +56,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
     """
     p, m = model.D.shape
     require_room(p, m, frequencies.size)
-    transfer = SparseTransfer(
-        (model.K, model.C, model.M),
-        (model.B, model.Bv, model.Ba),
-        (model.F, model.G, model.H),
-        (model.D, model.Dv, model.Da),
-    )
+    transfer = SparseTransfer(*model.quadratics)
     values = np.empty((p, m, frequencies.size), dtype=np.complex128)
     limit = DataLimit.none(values.shape)
     done = np.zeros(frequencies.size, dtype=bool)

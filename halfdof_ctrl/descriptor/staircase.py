@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray, powers_of_two
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.patterns import Places, diagonal_blocks
 
 ZERO_PIVOT = 64 * EPS  #: times the size: pivots below this part of the largest are zero
@@ -48,9 +48,9 @@ class Pencil:
         place = np.ix_(rows, columns)
         return Pencil(self.A[place], self.E[place], self.dA[place], self.dE[place])
 
-    def equilibrated(self) -> "Pencil":
+    def scaled(self) -> "Pencil":
         """Bring the largest entries of the rows and columns of A and E together near one."""
-        rows, columns = equilibrating_powers(np.maximum(np.abs(self.A), np.abs(self.E)))
+        rows, columns = scaling_powers(np.maximum(np.abs(self.A), np.abs(self.E)))
         scale = rows[:, None] * columns
         return Pencil(self.A * scale, self.E * scale, self.dA * scale**2, self.dE * scale**2)
 

@@ -52,7 +52,7 @@ class PencilStructure:
 
         The counts do not rest on it, which are exact.
         """
-        pencil = first_order_pencil((self.model.K, self.model.C, self.model.M))
+        pencil = first_order_pencil(self.model.quadratics.P)
         return infinite_part(pencil.A, pencil.E).evidence.gap
 
     @cached_property
@@ -114,7 +114,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     (('F_q2', 'q2', 2),)
     """
     model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
-    found = found_structure((model.K, model.C, model.M))
+    found = found_structure(model.quadratics.P)
     order = order_by_size(found.values)
     return PencilStructure(
         finite_eigenvalues=read_only(found.values[order]),

@@ -12,7 +12,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
 from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.growth import system_pencil
 from halfdof_ctrl.descriptor.minors import invariant_zeros
 from halfdof_ctrl.descriptor.regularity import require_regular
@@ -92,7 +92,7 @@ def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
 
 def _independent_columns(matrix: DenseMatrix) -> list[int]:
     """Pick columns that span the range."""
-    rows, columns = equilibrating_powers(np.abs(matrix))
+    rows, columns = scaling_powers(np.abs(matrix))
     _, triangle, order = scipy.linalg.qr(matrix * rows[:, None] * columns, mode="economic", pivoting=True)
     pivots = np.abs(np.diagonal(triangle))
     rank = int(np.count_nonzero(pivots > ZERO_PIVOT * max(matrix.shape) * pivots[0]))

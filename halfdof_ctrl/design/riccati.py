@@ -24,13 +24,12 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg.lapack import dtrsyl
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
 from halfdof_ctrl.base.double_double import Double2, added, matrix_product, two_sum
 from halfdof_ctrl.base.spectrum import balanced_states
 
 Solver = Literal["scipy", "slycot"]
 
-UNIT = float(np.finfo(float).eps) / 2.0
 SETTLED = 1e-15  #: a step that changes the gain by less is the last one
 MOST_STEPS = 100  #: each at least halves the distance, from however far
 FROM_AFAR = 0.3  #: relative steps above this one are not yet those of fast convergence, and may stagnate
@@ -82,7 +81,7 @@ def solved_care(problem: CareProblem, method: Solver, *, balance: bool = True) -
         found = _by_newton(scaled.problem, *start)
         if found is not None and (best is None or found.error < best.error):
             best = found
-        if best is not None and best.error < math.sqrt(UNIT):
+        if best is not None and best.error < math.sqrt(UNIT_ROUNDOFF):
             break
     if best is None:
         return None
@@ -152,7 +151,7 @@ def _starts(problem: CareProblem, method: Solver) -> Iterator[tuple[FloatArray |
     for gain in _gains_of_slow_part(folded, method):
         yield None, gain + problem.N.T
     size = float(np.linalg.norm(folded.A, 2))
-    Q = folded.Q + UNIT * max(float(np.linalg.norm(folded.Q, 2)), 1.0) * np.eye(len(folded.Q))
+    Q = folded.Q + UNIT_ROUNDOFF * max(float(np.linalg.norm(folded.Q, 2)), 1.0) * np.eye(len(folded.Q))
     for shift in SHIFTS:
         X = _solution(replace(folded, A=folded.A + shift * size * np.eye(len(Q)), Q=Q), method)
         if X is not None:
@@ -175,7 +174,7 @@ def _gains_of_slow_part(problem: CareProblem, method: Solver) -> Iterator[FloatA
     """Give gains on the slow eigenvalues alone, where all fast ones are stable: K = K_s W^T, W^T A = A_s W^T."""
     sizes = np.sort(np.abs(scipy.linalg.eigvals(problem.A)))[::-1]
     for k in np.flatnonzero(sizes[1:] * GAP < sizes[:-1]).tolist():
-        limit = math.sqrt(sizes[k] * max(sizes[k + 1], sizes[k] * UNIT))
+        limit = math.sqrt(sizes[k] * max(sizes[k + 1], sizes[k] * UNIT_ROUNDOFF))
 
         def is_slow(real: float, imag: float, limit: float = limit) -> bool:
             return math.hypot(real, imag) < limit
@@ -187,7 +186,7 @@ def _gains_of_slow_part(problem: CareProblem, method: Solver) -> Iterator[FloatA
         part = CareProblem(
             slow[:count, :count].T,
             basis.T @ problem.B,
-            basis.T @ problem.Q @ basis + UNIT * np.linalg.norm(problem.Q) * np.eye(count),
+            basis.T @ problem.Q @ basis + UNIT_ROUNDOFF * np.linalg.norm(problem.Q) * np.eye(count),
             problem.R,
             basis.T @ problem.N,
         )
@@ -269,7 +268,7 @@ def _sample(problem: CareProblem, X: FloatArray, gain: FloatArray, lyapunov: _Ly
     generator = np.random.default_rng(seed)
 
     def rounded(size: FloatArray) -> FloatArray:
-        return UNIT * size * generator.uniform(-1.0, 1.0, size.shape)
+        return UNIT_ROUNDOFF * size * generator.uniform(-1.0, 1.0, size.shape)
 
     dA = rounded(np.abs(problem.A) + 2.0 * np.abs(problem.B) @ np.abs(problem.N.T))
     dB, dN, dQ = rounded(np.abs(problem.B)), rounded(np.abs(problem.N)), rounded(np.abs(problem.Q))

@@ -11,8 +11,9 @@ from halfdof_ctrl.base.names import checked_names, listed
 from halfdof_ctrl.files.containers import Content, PathLike, load_variables, single_text, texts
 from halfdof_ctrl.files.naming import naming_the_file
 from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
-SYSTEM_LETTERS = ("A", "B", "C", "D")
+SYSTEM_LETTERS = StateSpaceData._fields
 SYSTEM_NAMES = ("states", "inputs", "outputs")
 UNKNOWN_PERIOD = -1.0  #: MATLAB's Ts of a sampled system without a period, True in python-control
 
@@ -33,7 +34,7 @@ def save_system(sys: control.StateSpace, path: PathLike) -> None:
     OSError
         The file cannot be written.
     """
-    content = {letter: np.asarray(getattr(sys, letter), dtype=float) for letter in SYSTEM_LETTERS}
+    content = StateSpaceData.of(sys)._asdict()
     if sys.dt is not None:
         content["dt"] = np.array(UNKNOWN_PERIOD if sys.dt is True else float(sys.dt))
     names = {"states": sys.state_labels, "inputs": sys.input_labels, "outputs": sys.output_labels}

@@ -1,27 +1,23 @@
 """Evaluate equation (1), ``F(s) P(s)^-1 B(s) + D(s)``, by a direct solve at each point.
 
-Each ``P(s)`` is equilibrated by powers of two (which rounds nothing), factorized with partial pivoting,
+Each ``P(s)`` is scaled by powers of two (which rounds nothing), factorized with partial pivoting,
 and its solution is corrected once where the componentwise backward error is above rounding. Where the solution of a
 random right-hand side, which is solved beside the others, shows that P(s) is nearly singular, the sum
 ``K + s C + s^2 M`` itself has lost digits: there the solution is refined with residuals summed term by term in twice
 the working precision (`exact_products`).
 """
 
-from collections.abc import Sequence
-from typing import TypeAlias
-
 import numpy as np
 import numpy.typing as npt
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, ModelMatrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, random_right_side, refined
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
-
-Coefficients: TypeAlias = Sequence[ModelMatrix]  #: of 1, s, s^2, all of one shape
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
 
@@ -100,7 +96,7 @@ def _refined(
     if not np.isfinite(states).all():
         return states
     matrix = _polynomial(P, np.array([s]))
-    rows, columns = _equilibrating_powers(matrix)
+    rows, columns = _scaling_powers(matrix)
     lu, pivots, info = zgetrf((matrix * rows * columns)[0])
     if info != 0:
         return states
@@ -155,7 +151,7 @@ def quadratic_rounding(
 
 def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
     """Return the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
-    columns = _equilibrating_powers(P)[1]
+    columns = _scaling_powers(P)[1]
     size = np.abs(_solved(P, B)[0]) / np.swapaxes(columns, 1, 2)
     return np.asarray((size + EPS * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
 
@@ -200,8 +196,8 @@ def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArra
 
 
 def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]:
-    """Solve ``P x = B`` for a stack of matrices, equilibrated; give the growth of a random right-hand side too."""
-    rows, columns = _equilibrating_powers(P)
+    """Solve ``P x = B`` for a stack of matrices, scaled; give the growth of a random right-hand side too."""
+    rows, columns = _scaling_powers(P)
     probe = np.broadcast_to(random_right_side(P.shape[1])[:, None], (*P.shape[:2], 1))
     scaled, right = P * rows * columns, np.concatenate([B * rows, probe], axis=2)
     solution = _solve_each(scaled, right)
@@ -215,7 +211,7 @@ def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]
     return solution[:, :, :-1], np.where(np.isfinite(growth), growth, np.inf)
 
 
-def _equilibrating_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
+def _scaling_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
     """Return powers of two for rows (k, n, 1) and columns (k, 1, n) that bring largest entries to one."""
     rows = powers_of_two(np.abs(P).max(axis=2, initial=0.0))[:, :, None]
     return rows, powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]

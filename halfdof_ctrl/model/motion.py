@@ -36,7 +36,7 @@ from halfdof_ctrl.base.names import (
     unknown_name_error,
 )
 from halfdof_ctrl.base.sparse_arrays import has_sparse, joined_sparse
-from halfdof_ctrl.model.evaluation import Coefficients
+from halfdof_ctrl.model.quadratics import Coefficients
 
 MotionKind: TypeAlias = Literal["displacement", "velocity", "acceleration"]
 

@@ -27,9 +27,10 @@ from halfdof_ctrl.base.sparse_arrays import (
     zeros_like,
 )
 from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
-from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer, squeezed
+from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer, squeezed
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
+from halfdof_ctrl.model.quadratics import Quadratics
 
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
 
@@ -76,6 +77,12 @@ class SecondOrderModel:
         """Letters of the complex matrices."""
         return tuple([letter for letter, matrix in zip(LETTERS, self._matrices(), strict=True) if is_complex(matrix)])
 
+    @property
+    def quadratics(self) -> Quadratics:
+        """Coefficients of 1, s, s^2 in P, B, F and D of equation (1): ``(K, C, M)``, ``(B, Bv, Ba)`` and so on."""
+        P, B, F = (self.K, self.C, self.M), (self.B, self.Bv, self.Ba), (self.F, self.G, self.H)
+        return Quadratics(P, B, F, (self.D, self.Dv, self.Da))
+
     def _matrices(self) -> tuple[ModelMatrix, ...]:
         return (self.M, self.C, self.K, self.B, self.Bv, self.Ba, self.F, self.G, self.H, self.D, self.Dv, self.Da)
 
@@ -104,7 +111,7 @@ class SecondOrderModel:
         (0.5+0j)
         """
         points = checked_points(s)
-        values = quadratic_transfer(*_coefficients(self), points.reshape(-1))
+        values = quadratic_transfer(*self.quadratics, points.reshape(-1))
         return squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)
 
     def select(self, inputs: Names = None, outputs: Names = None) -> "SecondOrderModel":
@@ -166,7 +173,7 @@ class SecondOrderModel:
         """
         new = prescribed_signals(self, dof, kind, inputs, outputs)
         base = self.select(new.old_inputs or self.inputs[:1], new.old_outputs or self.outputs[:1])
-        P, B, F, D = with_motion_as_input(*_coefficients(base), new.driven, new.derivative)
+        P, B, F, D = with_motion_as_input(*base.quadratics, new.driven, new.derivative)
         letters = ("K", "C", "M", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
         matrices: dict[str, Any] = dict(zip(letters, map(locked, (*P, *B, *F, *D)), strict=True))
         model = replace(
@@ -223,12 +230,6 @@ class SecondOrderModel:
             f"  inputs:  {listed(self.inputs)}\n"
             f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}{rounded_part}"
         )
-
-
-def _coefficients(model: SecondOrderModel) -> tuple[Coefficients, Coefficients, Coefficients, Coefficients]:
-    """Return the coefficients of 1, s, s^2 in P, B, F and D of equation (1)."""
-    P, B, F = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
-    return P, B, F, (model.D, model.Dv, model.Da)
 
 
 def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:

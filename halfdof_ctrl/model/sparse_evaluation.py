@@ -11,14 +11,14 @@ with residuals summed term by term (`exact_products`), and (DATA) says what the 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias, cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, ModelMatrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.progress import progress
@@ -26,10 +26,8 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_e
 from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
-
-Coefficients: TypeAlias = Sequence[ModelMatrix]  #: of 1, s, s^2, all of one shape
-
 
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
@@ -213,7 +211,7 @@ class SparsePencil:
         n = self.indptr.size - 1
         return csc_array((total, self.indices, self.indptr), shape=(n, n))
 
-    def equilibrated_at(self, s: complex) -> tuple[SparseMatrix, FloatArray, FloatArray]:
+    def scaled_at(self, s: complex) -> tuple[SparseMatrix, FloatArray, FloatArray]:
         """Give P(s) with the largest entries of its rows and columns near one, and the powers of two that do it."""
         P = self.at(s)
         by_row, _ = largest_by_row_and_column(P)
@@ -238,7 +236,7 @@ class SparsePencil:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PointFactors:
-    """P(s), equilibrated by powers of two and factorized."""
+    """P(s), scaled by powers of two and factorized."""
 
     lu: SuperLU
     matrix: SparseMatrix  #: what was factorized
@@ -256,7 +254,7 @@ class PointFactors:
         RuntimeError
             It is exactly singular.
         """
-        P, down, across = pencil.equilibrated_at(s)
+        P, down, across = pencil.scaled_at(s)
         symmetric = threshold < 1.0
         lu = splu(P, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)

@@ -130,7 +130,7 @@ def _has_part(product: FloatArray, columns: FloatArray) -> bool:
 
 def _sizes(base: SecondOrderModel) -> tuple[FloatArray, FloatArray]:
     """Return for each DOF the size of a stiffness and of a damping that is felt there."""
-    stiff, damped, mass = (np.abs(X).max(axis=1) for X in (base.K, base.C, base.M))
+    stiff, damped, mass = (np.abs(X).max(axis=1) for X in base.quadratics.P)
     K, C, M = (float(X.max()) for X in (stiff, damped, mass))
     omega = np.sqrt(K / M) if K > 0.0 and M > 0.0 else K / C if K > 0.0 and C > 0.0 else 1.0
     stiff = np.where(stiff > 0.0, stiff, np.where(damped > 0.0, omega * damped, K or omega * C or omega**2 * M or 1.0))

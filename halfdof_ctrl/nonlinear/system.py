@@ -11,6 +11,7 @@ from halfdof_ctrl.base.names import control_label, control_labels, listed
 from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.nonlinear.reduction import NonlinearReduction, reduce_nonlinear
 from halfdof_ctrl.nonlinear.small_motion import feedback_of_elements
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 
 class MechanicalIOSystem(control.NonlinearIOSystem):  # type: ignore[misc]  # control is untyped
@@ -111,16 +112,14 @@ def mech2nlsys(nonlinear: NonlinearModel) -> control.NonlinearIOSystem:
     return system
 
 
-def linearized(
-    reduction: NonlinearReduction, t: float, x: FloatArray, u: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return A, B, C, D of small motions about (t, x, u)."""
+def linearized(reduction: NonlinearReduction, t: float, x: FloatArray, u: FloatArray) -> StateSpaceData:
+    """Return the state space of small motions about (t, x, u)."""
     w, _ = reduction.solved(t, x, u)
     feedback = feedback_of_elements(reduction, t, w)
     output, m = reduction.output, u.size
     direct = output.direct(m + reduction.B_d.shape[1])
     by_x, by_u = feedback @ reduction.X_w, feedback @ reduction.U_w
-    return (
+    return StateSpaceData(
         reduction.A - reduction.B_d @ by_x,
         reduction.B - reduction.B_d @ by_u,
         output.X - direct[:, m:] @ by_x,

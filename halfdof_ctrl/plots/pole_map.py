@@ -18,6 +18,7 @@ from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_l
 from halfdof_ctrl.plots.pole_grid import draw_discrete_grid, draw_pole_grid, mark_multiple, set_pole_axes
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import working_matrix
 
 Mark: TypeAlias = tuple[ComplexArray, str, dict[str, Any]]
@@ -138,7 +139,7 @@ def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N8
 
 def _zeros_of(sys: control.StateSpace) -> ComplexArray:
     """Find the transmission zeros of a state space, with or without slycot the same."""
-    A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
+    A, B, C, D = StateSpaceData.of(sys)
     E = np.zeros((A.shape[0] + D.shape[0], A.shape[1] + D.shape[1]))
     E[: A.shape[0], : A.shape[1]] = np.eye(A.shape[0])
     return finite_part(np.block([[A, B], [C, D]]), E).eigenvalues

@@ -2,12 +2,13 @@
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
 from halfdof_ctrl.descriptor.growth import system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 
 def descriptor_zeros(model: SecondOrderModel, output: int, source: int) -> ComplexArray:
@@ -31,14 +32,16 @@ def descriptor_zeros(model: SecondOrderModel, output: int, source: int) -> Compl
     return np.asarray(finite_part(pencil.A, pencil.E).eigenvalues * pencil.scale)
 
 
-def system_zeros(A: FloatArray, b: FloatArray, c: FloatArray, d: float) -> ComplexArray:
-    """Find the invariant zeros of a state space with one input b (N, 1) and one output c (1, N).
+def system_zeros(channel: StateSpaceData) -> ComplexArray:
+    """Find the invariant zeros of a state space with one input and one output.
 
     Examples
     --------
-    >>> system_zeros(np.array([[-1.0]]), np.array([[1.0]]), np.array([[2.0]]), 1.0).real.tolist()
+    >>> lag = StateSpaceData(np.array([[-1.0]]), np.array([[1.0]]), np.array([[2.0]]), np.array([[1.0]]))
+    >>> system_zeros(lag).real.tolist()
     [-3.0]
     """
+    A, b, c, d = channel
     matrix, scale = balanced_states(A)
     E = np.zeros((len(A) + 1, len(A) + 1))
     E[: len(A), : len(A)] = np.eye(len(A))
@@ -46,5 +49,5 @@ def system_zeros(A: FloatArray, b: FloatArray, c: FloatArray, d: float) -> Compl
     row, column = c * scale, b / scale[:, None]
     out, drive = (float(np.abs(part).max(initial=0.0)) or 1.0 for part in (row, column))
     feed = d * size / out / drive
-    pencil = np.block([[matrix / size, column / drive], [row / out, np.array([[feed]])]])
+    pencil = np.block([[matrix / size, column / drive], [row / out, feed]])
     return np.asarray(finite_part(pencil, E).eigenvalues * size)

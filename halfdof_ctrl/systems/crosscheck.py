@@ -164,9 +164,9 @@ def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     system = BalancedSystem.of(sys)
     finite = structure.finite_eigenvalues
     gamma = typical_frequency(model)
-    moving = moving_eigenvalues(finite, system.A, gamma)
+    moving = moving_eigenvalues(finite, system.data.A, gamma)
     transfer = _compare_transfer(model, system, sys, moving)
-    pole_error, pole_worst = compare_poles(model, system.A, finite, gamma)
+    pole_error, pole_worst = compare_poles(model, system.data.A, finite, gamma)
     step_error, step_worst, horizon = _compare_steps(model, system, moving, transfer.unclear, structure.index)
     return CrossCheck(
         order=sys.nstates,
@@ -203,8 +203,7 @@ def _compare_transfer(
     found, rounding = system(points)
     difference, size = np.abs(found - exact), np.abs(exact)
     largest = _channel_size(size)
-    quadratics = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba), (model.F, model.G, model.H)
-    by_equations = quadratic_rounding(*quadratics, (model.D, model.Dv, model.Da), points) * (ROUNDING_OF_A / EPS)
+    by_equations = quadratic_rounding(*model.quadratics, points) * (ROUNDING_OF_A / EPS)
     errors = difference / (largest + (rounding + by_equations + _rounding_of_zeros(largest)) / TRANSFER_TOLERANCE)
     i, j, k = _place_of_largest(errors)
     worst = f"{model.outputs[i]} from {model.inputs[j]} at s = {complex_in_words(points[k])}"
@@ -227,11 +226,10 @@ def _compare_steps(
     plan = step_plan(moving)
     exact = descriptor_step_response(model, plan)
     found = np.empty_like(exact)
-    drives, gauges = (
-        powers_of_two(np.abs(part).max(axis=axis, initial=0.0)) for axis, part in enumerate((system.B, system.C))
-    )
+    A, B, C, D = system.data
+    drives, gauges = (powers_of_two(np.abs(part).max(axis=axis, initial=0.0)) for axis, part in enumerate((B, C)))
     unit = gauges[:, None] * drives
-    scaled = control.StateSpace(system.A, system.B * drives, gauges[:, None] * system.C, system.D * unit)
+    scaled = control.StateSpace(A, B * drives, gauges[:, None] * C, D * unit)
     for j in range(scaled.ninputs):
         state, done = np.zeros(scaled.nstates), 0
         for segment in plan:

@@ -34,6 +34,7 @@ from halfdof_ctrl.systems.phase import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
 
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
@@ -153,8 +154,7 @@ def frequency_response(
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
-    A, B, C, D = (np.asarray(matrix) for matrix in (sys.A, sys.B, sys.C, sys.D))
-    dofs = A, B, C, D
+    dofs = StateSpaceData.of(sys)
     values = state_space_response(*dofs, points) if model is None else response_of_model(model, dofs, points)
     data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
     return with_source(data, source_of(sys if model is None else model) or source_of(sys))
@@ -210,7 +210,8 @@ def system_modes(
     sys: control.StateSpace, polynomial: tuple[FloatArray, ...] = (), model: SecondOrderModel | None = None
 ) -> tuple[SeenModes, ComplexArray]:
     """Find which poles of a continuous state space and a polynomial part are seen, and the zeros of its channels."""
-    A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (sys.A, sys.B, sys.C, sys.D))
+    data = StateSpaceData.of(sys)
+    A, D = data.A, data.D
     poles = bounded_poles(A) if model is None else poles_of_model(model, A)
     if len(A) > MOST_CIRCLED:
         every = np.ones(poles.values.size, dtype=bool)
@@ -218,10 +219,10 @@ def system_modes(
     p, m = D.shape
     zeros = [np.zeros(0, dtype=np.complex128)]
     if p * m * len(A) ** 3 <= ZERO_EFFORT:
-        zeros += [system_zeros(A, B[:, [j]], C[[i]], D[i, j]) for i in range(p) for j in range(m)]
+        zeros += [system_zeros(data.channel(i, j)) for i in range(p) for j in range(m)]
 
     def response(points: ComplexArray) -> ComplexArray:
-        values = state_space_response(A, B, C, D, points)
+        values = state_space_response(*data, points)
         for power, part in enumerate(polynomial, start=1):
             values = values + part[:, :, None] * points**power
         return values

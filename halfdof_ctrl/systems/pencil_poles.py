@@ -10,11 +10,11 @@ are a better finite eigenvalue and what rounding of the entries moves it.
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray, powers_of_two
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, DenseMatrix, FloatArray, powers_of_two
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import energy_system
-from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, UNIT, BoundedPoles, bounded_poles
+from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, BoundedPoles, bounded_poles
 
 STEPS = 3  #: of Newton's method
 
@@ -67,5 +67,5 @@ def _first_order(parts: tuple[DenseMatrix, DenseMatrix, DenseMatrix], s: complex
     slope = complex(w @ (C + 2.0 * s * M) @ v)
     if slope == 0.0:
         return 0j, float(np.finfo(float).max)
-    data = 2.0 * UNIT * float(np.abs(w) @ size @ np.abs(v)) / abs(slope)
+    data = 2.0 * UNIT_ROUNDOFF * float(np.abs(w) @ size @ np.abs(v)) / abs(slope)
     return -complex(w @ P @ v) / slope, min(data, float(np.finfo(float).max))

@@ -21,6 +21,7 @@ from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 SOURCE = "halfdof_source"  #: attribute of a FrequencyResponseData: where its values come from
 ON_AXIS = 4.0  #: times its bound: a pole nearer to the axis is on it
@@ -40,28 +41,24 @@ HALVINGS = 6
 class SystemSource:
     """Values come from a continuous state space."""
 
-    A: FloatArray
-    B: FloatArray
-    C: FloatArray
-    D: FloatArray
+    data: StateSpaceData
 
     @property
     def size(self) -> int:
         """Order."""
-        return len(self.A)
+        return len(self.data.A)
 
     def poles(self) -> BoundedPoles:
         """Return the poles."""
-        return bounded_poles(self.A)
+        return bounded_poles(self.data.A)
 
     def zeros(self, output: int, source: int) -> ComplexArray:
         """Return the zeros of a channel."""
-        return system_zeros(self.A, self.B[:, [source]], self.C[[output]], float(self.D[output, source]))
+        return system_zeros(self.data.channel(output, source))
 
     def response(self, output: int, source: int, points: ComplexArray) -> ComplexArray:
         """Evaluate a channel."""
-        part = (self.B[:, [source]], self.C[[output]], self.D[[output]][:, [source]])
-        return np.asarray(state_space_response(self.A, *part, points)[0, 0])
+        return np.asarray(state_space_response(*self.data.channel(output, source), points)[0, 0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,7 +103,7 @@ def source_of(sysdata: control.StateSpace | SecondOrderModel) -> Source | None:
         return ModelSource(sysdata) if usable else None
     if sysdata.isdtime(strict=True):
         return None
-    return SystemSource(*(np.asarray(matrix, dtype=float) for matrix in (sysdata.A, sysdata.B, sysdata.C, sysdata.D)))
+    return SystemSource(StateSpaceData.of(sysdata))
 
 
 def response_phase(data: control.FrequencyResponseData) -> FloatArray:

@@ -16,11 +16,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.double_double import added, matrix_product, two_product
 from halfdof_ctrl.base.spectrum import balanced_states
 
-UNIT = float(np.finfo(float).eps) / 2.0
 STEPS = 4  #: inverse iterations at most
 COARSE = 1e-3  #: a correction above this part of the eigenvalue calls for an iteration ...
 DAMPING = 0.1  #: ... or above this part of its real part, which a picture of its peak rests on ...
@@ -110,7 +109,7 @@ def _iterated(
     """Improve an eigenvalue by inverse iteration from both sides, while it stays near."""
     unit, (v, w) = np.eye(A.shape[0]), vectors
     for _ in range(STEPS):
-        shift = value + UNIT * np.linalg.norm(A, 1) if value == 0.0 else value
+        shift = value + UNIT_ROUNDOFF * np.linalg.norm(A, 1) if value == 0.0 else value
         with np.errstate(all="ignore"):
             factors = scipy.linalg.lu_factor(A - shift * unit, check_finite=False)
             v_new = scipy.linalg.lu_solve(factors, v, check_finite=False)
@@ -148,7 +147,7 @@ def _first_order(
     product = np.einsum("ik,ik->k", left.conj(), right)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         correction = np.einsum("ik,ik->k", left.conj(), residual) / product
-        data = 2.0 * UNIT * np.einsum("ik,ik->k", np.abs(left), np.abs(A) @ np.abs(right)) / np.abs(product)
+        data = 2.0 * UNIT_ROUNDOFF * np.einsum("ik,ik->k", np.abs(left), np.abs(A) @ np.abs(right)) / np.abs(product)
     largest = np.finfo(float).max
     return np.where(np.isfinite(correction), correction, 0.0), np.minimum(np.nan_to_num(data, nan=largest), largest)
 

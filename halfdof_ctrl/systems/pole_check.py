@@ -6,7 +6,7 @@ import scipy.optimize
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import ROUNDING_OF_A, eigenvalues_and_rounding
 from halfdof_ctrl.base.words import complex_in_words
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding may move it
@@ -50,7 +50,7 @@ def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: 
         s = eigenvalue + part * (pole - eigenvalue)
         at = max(abs(s), gamma)
         size = np.abs(model.K) + at * np.abs(model.C) + at**2 * np.abs(model.M)
-        rows, columns = equilibrating_powers(size)
+        rows, columns = scaling_powers(size)
         scale = rows[:, None] * columns
         smallest = scipy.linalg.svdvals((model.K + s * model.C + s**2 * model.M) * scale)[-1]
         distances.append(smallest / scipy.linalg.svdvals(size * scale)[0])

@@ -23,7 +23,7 @@ def second_opinion(model: SecondOrderModel) -> str:
     True
     """
     every = list(range(len(model.outputs))), list(range(len(model.inputs)))
-    poles = first_order_pencil((model.K, model.C, model.M))
+    poles = first_order_pencil(model.quadratics.P)
     zeros = first_order_pencil(system_pencil(model, *every))
     if max(zeros.E.shape) > LARGEST:
         return f"not asked above dimension {LARGEST}"

@@ -16,9 +16,9 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.systems.pole_bounds import UNIT, BoundedPoles, bounded_poles
+from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 
 Response: TypeAlias = Callable[[ComplexArray], ComplexArray]  #: s (k,) to H (p, m, k)
 
@@ -27,7 +27,7 @@ TOGETHER = 16.0  #: poles nearer than this times the sum of their bounds are one
 SAME = 1e-6  #: ... and those nearer than this part of their size
 WITHIN = 0.1  #: radius of a circle, of the distance to the next pole and of the pole's size
 AROUND = 3.0  #: radius of a circle, of the spread of a cluster
-CIRCLE_ROUNDING = 64.0 * UNIT  #: of the largest |H| on a circle: coefficients below are none
+CIRCLE_ROUNDING = 64.0 * UNIT_ROUNDOFF  #: of the largest |H| on a circle: coefficients below are none
 VISIBLE = 1e-3  #: part of the rest of H that a pole adds where it adds most
 MOST_TERMS = 8  #: of a principal part
 NO_CHANNEL = 1e-12  #: channels that move less than this part of the largest are rounding

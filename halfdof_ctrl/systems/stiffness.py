@@ -22,9 +22,10 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
-from halfdof_ctrl.model.evaluation import Coefficients, checked_points, quadratic_transfer
+from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, checked_frequencies
@@ -294,7 +295,7 @@ def _receptance(model: SecondOrderModel, push: FloatArray, points: ComplexArray)
     """Return the motion of some DOFs per force on them, (1, 1, k)."""
     none = np.zeros_like(push)
     B, F, D = (push, none, none), (push.T, none.T, none.T), (np.zeros((1, 1)),) * 3
-    return quadratic_transfer((model.K, model.C, model.M), B, F, D, points)
+    return quadratic_transfer(model.quadratics.P, B, F, D, points)
 
 
 def _driven_response(
@@ -316,7 +317,7 @@ def _driven(
     force, motion = _units(base, forced), _units(base, shown).T
     no_force, no_motion, no_feed = np.zeros_like(force), np.zeros_like(motion), np.zeros((len(motion), force.shape[1]))
     coefficients = with_motion_as_input(
-        (base.K, base.C, base.M), (force, no_force, no_force), (motion, no_motion, no_motion), (no_feed,) * 3, places, 0
+        base.quadratics.P, (force, no_force, no_force), (motion, no_motion, no_motion), (no_feed,) * 3, places, 0
     )
     K, C, M = coefficients[0]
     dofs = tuple([name for place, name in enumerate(base.dofs) if place not in places])

@@ -24,6 +24,7 @@ from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles
 from halfdof_ctrl.systems.state_map import StateMap
 from halfdof_ctrl.systems.state_space import mech2ss, system_of_map
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.working_states import working_map
 
@@ -212,7 +213,7 @@ class _Plant:
         """Return the given times, or those that show what is seen in outputs and recovered DOFs."""
         if timepts is not None and np.ndim(timepts) > 0:
             return checked_times(timepts)
-        A, B, C, D = (np.asarray(part, dtype=float) for part in (self.sys.A, self.sys.B, self.sys.C, self.sys.D))
+        A, B, C, D = StateSpaceData.of(self.sys)
         if not (self.model.is_sparse and len(self.model.dofs) > MOST_TIMED):
             motion = (self.reduction if self.states is None else self.states).displacement
             motion = motion.whole() if isinstance(motion, SparseDisplacement) else motion

@@ -25,11 +25,10 @@ from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 AGREEMENT = 1e-12  #: relative difference between two evaluations up to which both are right
-SOUND_RESPONSE = (
-    1e-10  #: relative error of energy coordinates at tested points up to which a large model stays with them
-)
+SOUND_RESPONSE = 1e-10  #: relative error at tested points up to which a large model stays with the states it has
 FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
 MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
 
@@ -101,9 +100,7 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     return sys if form is None else energy_state_space(form)
 
 
-def response_of_model(
-    model: SecondOrderModel, dofs: tuple[FloatArray, FloatArray, FloatArray, FloatArray], points: ComplexArray
-) -> ComplexArray:
+def response_of_model(model: SecondOrderModel, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
     """Evaluate a model in the states that keep most digits.
 
     A model with many states is evaluated in DOF states, and stays there if these are right wherever it is tested by
@@ -113,15 +110,15 @@ def response_of_model(
     ----------
     model : SecondOrderModel
         Proper, with N states, m inputs and p outputs.
-    dofs : (N, N), (N, m), (p, N), (p, m) ndarrays
-        A, B, C, D in DOF states.
+    dofs : StateSpaceData
+        In DOF states.
     points : (k,) complex ndarray
 
     Returns
     -------
     (p, m, k) complex ndarray
     """
-    order = len(dofs[0])
+    order = len(dofs.A)
     if order > FEW_STATES and not model.is_sparse:
         values = state_space_response(*dofs, points)
         if _is_sound(model, values, points):
@@ -130,9 +127,7 @@ def response_of_model(
     return state_space_response(*dofs, points) if form is None else response_of_form(form, dofs, points)
 
 
-def response_of_form(
-    form: EnergyForm, dofs: tuple[FloatArray, FloatArray, FloatArray, FloatArray], points: ComplexArray
-) -> ComplexArray:
+def response_of_form(form: EnergyForm, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
     """Evaluate a model in energy coordinates and in DOF states, and keep the better where they differ.
 
     Which is better tell refined solves of the descriptor form at a few of the points where they differ, and those
@@ -142,8 +137,8 @@ def response_of_form(
     ----------
     form : EnergyForm
         Of a proper model with N states, m inputs and p outputs.
-    dofs : (N, N), (N, m), (p, N), (p, m) ndarrays
-        A, B, C, D of the same model in DOF states.
+    dofs : StateSpaceData
+        The same model in DOF states.
     points : (k,) complex ndarray
 
     Returns
@@ -199,7 +194,7 @@ def refined_response(model: SecondOrderModel, points: ComplexArray) -> ComplexAr
     >>> refined_response(mechss([[0]], [[0]], [[4]]), np.array([1j])).ravel().tolist()
     [(0.25+0j)]
     """
-    exact = ExactPolynomial([model.K, model.C, model.M])
+    exact = ExactPolynomial(model.quadratics.P)
     shape = (len(model.outputs), len(model.inputs), points.size)
     values = np.full(shape, complex(np.nan, np.nan))
     for k, s in enumerate(points.tolist()):

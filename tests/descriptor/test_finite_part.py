@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl.base.arrays import powers_of_two
-from halfdof_ctrl.descriptor.balancing import equilibrating_powers
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 
 EIGENVALUES = 1e-9  # after transformations of condition up to 1e3 on at most 10 unknowns
@@ -116,12 +116,12 @@ def test_rank_gap_is_reported() -> None:
 
 
 @given(seed=st.integers(0, 2**32 - 1), spread=st.integers(0, 200))
-def test_equilibrating_powers_bring_maxima_near_one(seed: int, spread: int) -> None:
+def test_scaling_powers_bring_maxima_near_one(seed: int, spread: int) -> None:
     """Rows and columns end between 1/8 and 8, by powers of two."""
     generator = np.random.default_rng(seed)
     matrix = generator.uniform(0.5, 2.0, (4, 5)) * 2.0 ** generator.integers(-spread, spread + 1, (4, 1))
     matrix *= 2.0 ** generator.integers(-spread, spread + 1, 5)
-    rows, columns = equilibrating_powers(matrix)
+    rows, columns = scaling_powers(matrix)
     scaled = matrix * rows[:, None] * columns
     for maxima in (scaled.max(axis=0), scaled.max(axis=1)):
         assert (np.abs(np.log2(maxima)) <= 3.0).all()

@@ -80,7 +80,7 @@ def test_plain_call_goes_from_the_motion_to_its_reaction() -> None:
     assert_array_equal(model.K, [[1000, 0], [0, 1000]])
     assert_array_equal(model.B, [[0], [500]])
     assert_array_equal(model.Bv, [[100], [0]])
-    assert_array_equal([model.D, model.Dv, model.Da], [[[5500]], [[100]], [[20]]])
+    assert_array_equal(model.quadratics.D, [[[5500]], [[100]], [[20]]])
     assert "motion prescribed: y" in repr(model)
     assert model.select(["y", "F_y1"], ["y2_dot", "R_y"]).inputs == ("y", "F_y1")
 
@@ -91,7 +91,7 @@ def test_integrators_keep_the_dof(kind: MotionKind, inputs: tuple[str, ...]) -> 
     model = hydromount().prescribe_motion("y", kind)
     assert (model.dofs, model.inputs, model.outputs) == (("y", "y1", "y2"), inputs, ("R_y",))
     order = ORDERS[kind]
-    for power, matrix in enumerate((model.K, model.C, model.M)):
+    for power, matrix in enumerate(model.quadratics.P):
         assert_array_equal(matrix[0], [float(power == order), 0, 0])
         if power >= order:
             assert_array_equal(matrix[1:, 0], [0, 0])

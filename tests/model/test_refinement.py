@@ -45,11 +45,9 @@ def test_soft_masses_over_stiff_links_keep_their_digits(*, is_sparse: bool) -> N
 def test_growth_is_small_where_nothing_is_lost() -> None:
     """A mount of ordinary numbers asks for no refinement."""
     model = mechss(np.eye(2), None, [[2.0, -1.0], [-1.0, 2.0]])
-    coefficients = (model.K, model.C, model.M), (model.B, model.Bv, model.Ba)
-    outputs = (model.F, model.G, model.H), (model.D, model.Dv, model.Da)
-    values, growth = transfer_and_growth(*coefficients, *outputs, np.array([0.1j, 0.5j]))
+    values, growth = transfer_and_growth(*model.quadratics, np.array([0.1j, 0.5j]))
     assert growth.max() < 100.0
-    assert_allclose(values, quadratic_transfer(*coefficients, *outputs, np.array([0.1j, 0.5j])), rtol=0.0, atol=0.0)
+    assert_allclose(values, quadratic_transfer(*model.quadratics, np.array([0.1j, 0.5j])), rtol=0.0, atol=0.0)
 
 
 def test_data_and_slope_of_an_oscillator_are_those_of_the_formula() -> None:

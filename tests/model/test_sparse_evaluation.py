@@ -53,9 +53,7 @@ def test_the_order_is_found_once_and_kept() -> None:
     """After the first point the pencil is in order, and SuperLU takes it as it is."""
     structure = space_frame(3, 3, 3, 4, parts=2)
     model = structure.model().select("F_q0", ["q0", "q9"])
-    transfer = SparseTransfer(
-        (model.K, model.C, model.M), (model.B,) * 3, (model.F, model.G, model.H), (model.D, model.Dv, model.Da)
-    )
+    transfer = SparseTransfer(model.quadratics.P, (model.B,) * 3, model.quadratics.F, model.quadratics.D)
     first = transfer.pencils[0]
     assert not first.is_ordered
     transfer.at(3j)

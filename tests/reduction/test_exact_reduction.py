@@ -87,7 +87,7 @@ def test_order_of_small_structures_is_exact(structure: Structure) -> None:
 def test_rounding_in_null_vectors_does_not_hide_a_singular_leading_matrix(
     M: list[list[int]], C: list[list[int]], K: list[list[int]]
 ) -> None:
-    """W is exactly singular; only rounding of C T_c or K T_k, equilibrated, makes it look regular."""
+    """W is exactly singular; only rounding of C T_c or K T_k, scaled, makes it look regular."""
     assert exact.leading_matrix_is_singular(M, C, K)
     with pytest.raises(SingularLeadingMatrixError, match="singular to working precision"):
         exact_reduction(mechss(M, C, K), method="orthogonal")

@@ -243,10 +243,10 @@ def signals(generator: np.random.Generator, structure: Structure) -> SecondOrder
 
 def in_units(model: SecondOrderModel, columns: FloatArray, rows: FloatArray, tau: float) -> SecondOrderModel:
     """Measure DOFs, equations and time in other units; inputs and outputs stay what they are."""
-    P = [matrix * rows[:, None] * columns * tau**k for k, matrix in enumerate((model.K, model.C, model.M))]
-    B = [matrix * rows[:, None] * tau**k for k, matrix in enumerate((model.B, model.Bv, model.Ba))]
-    F = [matrix * columns * tau**k for k, matrix in enumerate((model.F, model.G, model.H))]
-    D = [matrix * tau**k for k, matrix in enumerate((model.D, model.Dv, model.Da))]
+    P = [matrix * rows[:, None] * columns * tau**k for k, matrix in enumerate(model.quadratics.P)]
+    B = [matrix * rows[:, None] * tau**k for k, matrix in enumerate(model.quadratics.B)]
+    F = [matrix * columns * tau**k for k, matrix in enumerate(model.quadratics.F)]
+    D = [matrix * tau**k for k, matrix in enumerate(model.quadratics.D)]
     return mechss(P[2], P[1], P[0], B[0], *F[:2], H=F[2], D=D[0], Bv=B[1], Ba=B[2], Dv=D[1], Da=D[2])
 
 

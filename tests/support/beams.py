@@ -84,7 +84,7 @@ def ball_transfer(model: SecondOrderModel, points: npt.ArrayLike) -> npt.NDArray
 
 def _ball_value(model: SecondOrderModel, s: complex) -> complex:
     point = flint.acb(s.real, s.imag)
-    K, C, M = (_ball_matrix(matrix) for matrix in (model.K, model.C, model.M))
+    K, C, M = (_ball_matrix(matrix) for matrix in model.quadratics.P)
     motion = (K + C * point + M * (point * point)).solve(_ball_matrix(model.B))
     return complex((_ball_matrix(model.F) * motion)[0, 0])
 

@@ -92,8 +92,8 @@ class RationalTransfer:
 
 def rational_transfer(model: SecondOrderModel) -> RationalTransfer:
     """Find equation (1) as polynomials; for a singular pencil the denominator is zero and no numerators are given."""
-    P, B = _integers((model.K, model.C, model.M), (model.B, model.Bv, model.Ba))
-    outputs = (model.F, model.G, model.H), (model.D, model.Dv, model.Da)
+    P, B = _integers(model.quadratics.P, model.quadratics.B)
+    outputs = model.quadratics.F, model.quadratics.D
     found = _transfer(P, B, *_integers(*outputs))
     return RationalTransfer(found.numerators, found.denominator * (1 << _exponent(outputs)))
 

@@ -45,9 +45,7 @@ def rational_coefficients(matrix: FloatArray) -> list[object]:
 
 def realization(model: SecondOrderModel) -> tuple[Realization, Units]:
     """Relax and solve a model's equations."""
-    rows, units = scaled_rows(
-        np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
-    )
+    rows, units = scaled_rows(np.stack(model.quadratics.P).astype(float), np.stack(model.quadratics.B).astype(float))
     result = relaxed(RowSystem.scaled(rows), USUAL)
     assert result.offsets is not None
     return realized(result.system, result.offsets, USUAL), units

@@ -66,7 +66,7 @@ def test_single_dof_has_the_stiffness_of_its_matrices() -> None:
     """``K + C s + M s^2``, where no other DOF is left; several DOFs that move together have the sum of P(s)."""
     assert_allclose(dynamic_stiffness(mechss([[2]], [[3]], [[5]]), "q0", POINTS), 2 * POINTS**2 + 3 * POINTS + 5)
     model = hydromount()
-    total = sum((matrix.sum() * POINTS**power for power, matrix in enumerate((model.K, model.C, model.M))), start=0j)
+    total = sum((matrix.sum() * POINTS**power for power, matrix in enumerate(model.quadratics.P)), start=0j)
     assert_allclose(dynamic_stiffness(model, ["y", "y1", "y2"], POINTS), total, rtol=ROUNDOFF)
 
 

@@ -8,11 +8,11 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, unit_free_factors
+from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, unit_free_scaling
 
 RANK_TOLERANCE = 16 * EPS  #: times the block's size; singular values below are null
-ENTRIES = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
-UNCLEAR = 1e3  #: singular values above that and below this times it are split at the widest gap
+ENTRY_NOISE = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
+UNCLEAR_RANK = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
 
 
@@ -45,23 +45,24 @@ def split_block(block: FloatArray, tol: float | None) -> BlockSplit:
     Parameters
     ----------
     block : (k, d) ndarray
-        Scaled here by `scaling.unit_free_factors`, so that the decision is the same in any units.
+        Scaled here by `scaling.unit_free_scaling`, so that the decision is the same in any units.
     tol : float, optional
         Singular values up to `tol` times the largest count as zero. By default those up to 16 max(k, d) eps, and
         where others lie within 1e3 times that, those below the widest gap among them.
     """
-    row_factors, factors = unit_free_factors(block)
-    _, values, right = scipy.linalg.svd(block * row_factors[:, None] * factors)
+    scaling = unit_free_scaling(block)
+    _, values, right = scipy.linalg.svd(scaling.of(block))
     bound = tol
     if bound is None:
         rounding = max(block.shape) * RANK_TOLERANCE
-        bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR)
+        bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR_RANK)
     rank = int(np.count_nonzero(values > bound * values[0]))
     spread = float(values[0] / values[rank - 1]) if rank else 1.0
     speck = 4 * max(block.shape) * EPS * spread
     clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-    noise = ENTRIES * max(block.shape) * float(values[0])
-    return BlockSplit(values, rank, float(bound * values[0]), noise, factors[:, None] * clean, factors, spread)
+    noise = ENTRY_NOISE * max(block.shape) * float(values[0])
+    mixing = scaling.columns[:, None] * clean
+    return BlockSplit(values, rank, float(bound * values[0]), noise, mixing, scaling.columns, spread)
 
 
 def lengths_of_columns(basis: FloatArray) -> FloatArray:

@@ -15,6 +15,8 @@ from halfdof_ctrl.base.arrays import FloatArray
 
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
+LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
+
 
 def as_integers(values: FloatArray) -> tuple[IntegerArray, int]:
     """Return integers and the power of two that they have been multiplied by.

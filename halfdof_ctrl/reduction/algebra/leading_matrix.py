@@ -7,17 +7,17 @@ import numpy.typing as npt
 import scipy.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.reduction.algebra.scaling import evening_logs
+from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling
 
-SINGULAR = float(np.finfo(float).eps)  #: times n: W is singular below this reciprocal condition number
-FEWEST = 256  #: n in that bound at least
+SINGULAR_RCOND = EPS  #: times n: W is singular below this reciprocal condition number
+LEAST_SIZE = 256  #: n in that bound at least
 PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number is not scaled, nor its state space compared ...
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
-SMALL = 60  #: DOFs that are few
-MOST_STEPS = 16  #: of the iteration for the best scaling
+FEW_DOFS = 60  #: DOFs that are few
+MOST_SCALING_STEPS = 16  #: of the iteration for the best scaling
 LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
-GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
+SCALING_GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -34,7 +34,7 @@ class LeadingMatrix:
     pivots: npt.NDArray[np.int32]
     rows: FloatArray | None  #: (n,) powers of two, None where W was taken as it is
     columns: FloatArray | None  #: (n,) likewise
-    equilibrated: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
+    scaled: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
     rcond: float  #: reciprocal 1-norm condition number of the matrix that was factorized; 0 if exactly singular
 
     @classmethod
@@ -49,41 +49,40 @@ class LeadingMatrix:
         enough = plainly_regular(len(W))
         factors, pivots, rcond = _lu_and_rcond(W)
         if rcond >= enough:
-            return cls(factors=factors, pivots=pivots, rows=None, columns=None, equilibrated=None, rcond=rcond)
-        rows, columns = [np.exp2(np.round(logs)) for logs in evening_logs(W)]
-        leading = cls._scaled(W, rows, columns)
+            return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=None, rcond=rcond)
+        leading = cls._scaled(W, log_scaling(W, powers_of_two=True))
         if leading.rcond == 0.0 or leading.rcond >= enough:
             return leading
-        better = cls._scaled(W, *leading.best_scaling())
+        better = cls._scaled(W, leading.best_scaling())
         return better if better.rcond > leading.rcond else leading
 
     @classmethod
-    def _scaled(cls, W: FloatArray, rows: FloatArray, columns: FloatArray) -> "LeadingMatrix":
-        matrix = W * rows[:, None] * columns
-        factors, pivots, rcond = _lu_and_rcond(matrix)
-        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, equilibrated=matrix, rcond=rcond)
+    def _scaled(cls, W: FloatArray, scaling: Scaling) -> "LeadingMatrix":
+        scaled = scaling.of(W)
+        factors, pivots, rcond = _lu_and_rcond(scaled)
+        rows, columns = scaling
+        return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, scaled=scaled, rcond=rcond)
 
-    def best_scaling(self) -> tuple[FloatArray, FloatArray]:
+    def best_scaling(self) -> Scaling:
         """Return powers of two near the row and column factors with which W has its least 1-norm condition number.
 
         The row factors u are the left Perron vector of ``|W| |W^-1|``, the column factors one over ``u |W|``. For
         any u the condition number is the largest entry of ``u |W| |W^-1| / u``, and power iteration lowers it.
         """
-        if self.equilibrated is None or self.rows is None or self.columns is None:
-            return np.ones(len(self.factors)), np.ones(len(self.factors))
-        size, inverse = np.abs(self.equilibrated), np.abs(dgetri(self.factors, self.pivots)[0])
+        if self.scaled is None or self.rows is None or self.columns is None:
+            return Scaling(np.ones(len(self.factors)), np.ones(len(self.factors)))
+        size, inverse = np.abs(self.scaled), np.abs(dgetri(self.factors, self.pivots)[0])
         u, least = np.ones(len(size)), np.inf
         best = u, u
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_SCALING_STEPS):
             across = u @ size
             following = across @ inverse
             largest = float((following / u).max())
-            if not largest < GAIN * least:
+            if not largest < SCALING_GAIN * least:
                 break
             best, least = (u, 1.0 / across), largest
             u = np.maximum(following / following.max(), LEAST_FACTOR)
-        rows, columns = [np.exp2(np.round(np.log2(factors))) for factors in best]
-        return self.rows * rows, self.columns * columns
+        return Scaling(self.rows, self.columns).then(Scaling(*[np.exp2(np.round(np.log2(part))) for part in best]))
 
     @property
     def is_plainly_regular(self) -> bool:
@@ -96,7 +95,7 @@ class LeadingMatrix:
 
         Columns of W that combine DOFs are rounded themselves, which even a small W may show.
         """
-        return self.rcond < max(len(self.factors), FEWEST) * SINGULAR
+        return self.rcond < max(len(self.factors), LEAST_SIZE) * SINGULAR_RCOND
 
     def singular_values(self) -> FloatArray:
         """Return the singular values of the matrix that was factorized."""
@@ -116,18 +115,18 @@ class LeadingMatrix:
         return size
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return ``W^-1 right`` for an (n, k) array, refined once where W was equilibrated."""
-        if self.rows is None or self.columns is None or self.equilibrated is None:
+        """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled."""
+        if self.rows is None or self.columns is None or self.scaled is None:
             return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
         right = right * self.rows[:, None]
         solution = dgetrs(self.factors, self.pivots, right)[0]
-        solution += dgetrs(self.factors, self.pivots, right - self.equilibrated @ solution)[0]
+        solution += dgetrs(self.factors, self.pivots, right - self.scaled @ solution)[0]
         return np.asarray(solution * self.columns[:, None])
 
 
 def plainly_regular(size: int) -> float:
     """Return the reciprocal condition number from which on W of so many DOFs needs no closer look."""
-    return PLAINLY_REGULAR_IF_SMALL if size <= SMALL else PLAINLY_REGULAR
+    return PLAINLY_REGULAR_IF_SMALL if size <= FEW_DOFS else PLAINLY_REGULAR
 
 
 def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:

@@ -1,6 +1,6 @@
 """One sparse factorization of a real matrix, for solutions with the matrix and with its transpose.
 
-The matrix is equilibrated by powers of two. Where its pattern is nearly symmetric, SuperLU (X. S. Li, 2005) orders it
+The matrix is scaled by powers of two. Where its pattern is nearly symmetric, SuperLU (X. S. Li, 2005) orders it
 by minimum degree of ``W + W^T`` and takes its pivots from the diagonal, which leaves the fewest entries in the
 factors; that is as stable as elimination without pivoting is for the matrix at hand, for a stiffness very. What a test
 solution loses tells: where it is more than rounding, solutions are corrected once, and where it is much, pivots
@@ -20,29 +20,26 @@ import numpy as np
 from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import LinearOperator, onenormest, splu
 
-from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.sparse_arrays import SparseMatrix, column_of_entries, largest_by_row_and_column
+from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, SYMMETRIC_SHARE
 from halfdof_ctrl.base.sparse_products import exact_residual, times
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import EVEN, MOST_PASSES, evening_logs, inverse_roots, root_or_one
+from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, Scaling, log_scaling, max_scaling
 
-PIVOTINGS = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))  #: order; least pivot over its column
-WIDTH = 8  #: right-hand sides worked at a time
 REFINED = 2.0**-46  #: componentwise backward error of the test solution above which solutions are corrected once
 ILL_CONDITIONED = 2.0**-24  #: reciprocal condition number below which solutions are corrected once
 UNSAFE = 1e-8  #: componentwise backward error of the test solution that calls for partial pivoting
-SYMMETRIC_SHARE = 0.5  #: of the entries that have a partner across the diagonal where the order is a symmetric one
-SINGULAR = 16 * float(np.finfo(float).eps)  #: reciprocal condition number of a singular W; n eps for n below 16
-SETTLED = 1e-8  #: accuracy of the scaling by logarithms, squared residual over the first one
+SINGULAR_SPARSE_RCOND = 16 * EPS  #: reciprocal condition number of a singular W; n eps for n below 16
 NUDGE = 2.0**-40  #: times the scaled matrix: what is added to find a null vector
-DOUBTFUL = 1e-6  #: reciprocal condition number below which another scaling is tried ...
-CHEAP = 200  #: ... of a matrix of up to so many rows
+DOUBTFUL_RCOND = 1e-6  #: reciprocal condition number below which another scaling is tried ...
+FEW_ROWS = 200  #: ... of a matrix of up to so many rows
 NULL_STEPS = 3  #: of inverse iteration for a null vector
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class SparseLU:
-    """A real n x n matrix W, equilibrated and factorized.
+    """A real n x n matrix W, scaled and factorized.
 
     Solutions are those of ``diag(rows) W``: who scales the equations by `rows` need not scale them back.
     """
@@ -56,35 +53,34 @@ class SparseLU:
 
     @classmethod
     def factorized(cls, matrix: SparseMatrix) -> "SparseLU":
-        """Equilibrate, factorize and estimate the condition.
+        """Scale, factorize and estimate the condition.
 
         Even maxima may leave a matrix badly scaled still: one that looks singular is scaled by the means of the
         logarithms of its entries, which does not depend on units, and judged again; a small one that looks ill
         conditioned is scaled as the dense leading matrix is.
         """
-        first = cls._scaled(matrix, *sparse_equilibrating_factors(matrix))
-        if matrix.shape[0] <= CHEAP and first.rcond < DOUBTFUL:
+        first = cls._scaled(matrix, max_scaling(matrix))
+        if matrix.shape[0] <= FEW_ROWS and first.rcond < DOUBTFUL_RCOND:
             best = LeadingMatrix.factorized(matrix.toarray())
             if best.rows is not None and best.columns is not None:
-                return _better(first, cls._scaled(matrix, best.rows, best.columns))
+                return _better(first, cls._scaled(matrix, Scaling(best.rows, best.columns)))
         if not first.is_singular:
             return first
-        return _better(
-            first, cls._scaled(matrix, *[np.exp2(np.round(log)) for log in evening_logs(matrix, settled=SETTLED)])
-        )
+        return _better(first, cls._scaled(matrix, log_scaling(matrix, ROUGHLY_SETTLED, powers_of_two=True)))
 
     @classmethod
-    def _scaled(cls, matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> "SparseLU":
-        scaled = scaled_matrix(matrix, rows, columns)
+    def _scaled(cls, matrix: SparseMatrix, scaling: Scaling) -> "SparseLU":
+        scaled = scaling.of_sparse(matrix)
         factors, corrected = _factorized(csc_array(scaled.T))
         rcond = 0.0 if factors is None else _reciprocal_condition(scaled, factors)
         corrected = corrected or 0.0 < rcond < ILL_CONDITIONED
+        rows, columns = scaling
         return cls(scaled=scaled, rows=rows, columns=columns, factors=factors, corrected=corrected, rcond=rcond)
 
     @property
     def is_singular(self) -> bool:
         """Whether W is singular to working precision."""
-        return self.rcond < min(self.rows.size * float(np.finfo(float).eps), SINGULAR)
+        return self.rcond < min(self.rows.size * EPS, SINGULAR_SPARSE_RCOND)
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``W^-1 diag(rows)^-1 right`` for an (n, k) array, k small."""
@@ -135,50 +131,6 @@ def _better(one: SparseLU, other: SparseLU) -> SparseLU:
 def largest_of_columns(matrix: FloatArray) -> FloatArray:
     """Return the size of the largest entry of each column."""
     return np.asarray(np.maximum(matrix.max(axis=0, initial=0.0), -matrix.min(axis=0, initial=0.0)))
-
-
-def sparse_equilibrating_factors(matrix: SparseMatrix, even: float = EVEN) -> tuple[FloatArray, FloatArray]:
-    """Return powers of two as `scaling.equilibrating_factors` does, for a sparse matrix.
-
-    Examples
-    --------
-    >>> sparse_equilibrating_factors(csc_array([[65536.0, 0.0], [0.0, 0.5]]))
-    (array([0.00195312, 1.        ]), array([0.00195312, 1.        ]))
-    """
-    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-    column = column_of_entries(size)
-    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
-    for _ in range(MOST_PASSES):
-        by_row, by_column = largest_by_row_and_column(size)
-        maxima = np.concatenate([by_row[by_row > 0.0], by_column[by_column > 0.0]])
-        if maxima.size == 0 or (maxima.min() >= 1.0 / even and maxima.max() <= even):
-            break
-        down, across = inverse_roots(by_row), inverse_roots(by_column)
-        rows *= down
-        columns *= across
-        size.data *= down[size.indices]
-        size.data *= across[column]
-    return rows, columns
-
-
-def sparse_levelling_factors(matrix: SparseMatrix) -> tuple[FloatArray, FloatArray]:
-    """Return factors as `scaling.levelling_factors` does, for a sparse matrix."""
-    size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
-    column = column_of_entries(size)
-    rows, columns = np.ones(matrix.shape[0]), np.ones(matrix.shape[1])
-    for _ in range(MOST_PASSES):
-        down, across = [1.0 / root_or_one(maxima) for maxima in largest_by_row_and_column(size)]
-        rows *= down
-        columns *= across
-        size.data *= down[size.indices]
-        size.data *= across[column]
-    return rows, columns
-
-
-def scaled_matrix(matrix: SparseMatrix, rows: FloatArray, columns: FloatArray) -> SparseMatrix:
-    """Return ``diag(rows) matrix diag(columns)``."""
-    data = matrix.data * rows[matrix.indices] * columns[column_of_entries(matrix)]
-    return csc_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def is_nearly_symmetric(matrix: SparseMatrix) -> bool:

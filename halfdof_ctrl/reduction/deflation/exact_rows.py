@@ -27,14 +27,14 @@ from halfdof_ctrl.reduction.deflation.row_system import (
     Caution,
     Elimination,
     RowSystem,
-    levelled,
+    level_scaled,
     shifts_of,
     tight_places,
 )
 
-SHORT = 24  #: bits of numbers that are taken for exact
-LONGEST = 320  #: bits of integers that are kept as they are: exact numbers of small models are shorter
-KEPT = 160  #: bits of those that are rounded: three times as many as the numbers that were given have
+SHORT_BITS = 24  #: bits of numbers that are taken for exact
+LONGEST_INTEGER = 320  #: bits of integers that are kept as they are: exact numbers of small models are shorter
+KEPT_BITS = 160  #: bits of those that are rounded: three times as many as the numbers that were given have
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -83,7 +83,7 @@ class ExactRows(RowSystem):
         sources, columns = group[0].sources, group[0].columns
         if sources.size == 0:
             return np.zeros((0, len(group)), dtype=object), 1
-        part = levelled(self, offsets, offsets.tight(self.matrix), sources, columns)
+        part = level_scaled(self, offsets, offsets.tight(self.matrix), sources, columns)
         _, _, order = scipy.linalg.qr(part.matrix, mode="economic", pivoting=True)
         chosen = columns[np.sort(order[: sources.size])]
         dependent = np.array([item.row for item in group], dtype=np.intp)
@@ -159,9 +159,9 @@ class _Draft:
         self.exact.append(not row[nothing].any())
         row[nothing] = image[nothing] = noise[nothing] = 0
         length = max([int(value).bit_length() for value in row.ravel()])
-        self.exact.append(length <= LONGEST)
-        if length > LONGEST:
-            row, power = (row + (1 << (length - KEPT - 1))) >> (length - KEPT), power - (length - KEPT)
+        self.exact.append(length <= LONGEST_INTEGER)
+        if length > LONGEST_INTEGER:
+            row, power = (row + (1 << (length - KEPT_BITS - 1))) >> (length - KEPT_BITS), power - (length - KEPT_BITS)
         lift, self.row_logs[h] = old.normalization(image)
         self.coefficients[:, h], self.operations[:, h] = np.ldexp(image, lift), np.ldexp(operation, lift)
         self.variance[:, h] = np.ldexp(noise, lift) ** 2 + (EPS * self.coefficients[:, h]) ** 2
@@ -192,7 +192,7 @@ def _bits(weight: int, power: int) -> int:
 
 def _are_short(values: FloatArray) -> bool:
     """Return whether numbers have so few bits that they can be meant to the last one: 3 and 0.625, but not 0.1."""
-    fractions = np.ldexp(np.frexp(values)[0], SHORT)
+    fractions = np.ldexp(np.frexp(values)[0], SHORT_BITS)
     return bool((fractions == np.rint(fractions)).all())
 
 

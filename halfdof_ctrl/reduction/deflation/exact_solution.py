@@ -15,8 +15,8 @@ from halfdof_ctrl.reduction.deflation.realization import Realization, levels
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations, trimmed
 
 LARGEST_EFFORT = 5e8  #: operations on bits, about a second
-LONGEST = 320  #: bits of denominators that are kept as they are
-KEPT = 200  #: bits of those that are rounded
+LONGEST_DENOMINATOR = 320  #: bits of denominators that are kept as they are
+KEPT_DENOMINATOR = 200  #: bits of those that are rounded
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -105,9 +105,9 @@ def _derivatives(realization: Realization, system: ExactRows) -> _Fractions:
 
 def _of_bounded_length(numerators: IntegerArray, denominator: int) -> tuple[IntegerArray, int]:
     """Round fractions whose denominator is too long to that of a power of two."""
-    if denominator.bit_length() <= LONGEST:
+    if denominator.bit_length() <= LONGEST_DENOMINATOR:
         return numerators, denominator
-    return (numerators << KEPT) // denominator, 1 << KEPT
+    return (numerators << KEPT_DENOMINATOR) // denominator, 1 << KEPT_DENOMINATOR
 
 
 def _right_side(

@@ -15,6 +15,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilE
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
@@ -22,21 +23,19 @@ from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_u
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
-from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
+from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.loss import Loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
-from halfdof_ctrl.reduction.method.proof import NEAR, ScaledPencil, scaled_pencil
+from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
 AS_GIVEN = Caution(0.0, 0.0)  #: entries are what they are to the last digit
-ENOUGH = 1e-9  #: lost by floating point, above which exact row operations are tried as well
-LARGEST_EXACT = 60  #: equations up to which row operations are exact
-ROUNDING = 256 * EPS  #: of the largest response to an input: coefficients of its derivatives below are rounding ...
-NOISE = 30.0  #: ... and below this times the error that was measured
-TRUSTED = 1e-8  #: of the response: measured errors above it do not say what is rounding
+DERIVATIVE_ROUNDING = 256 * EPS  #: of the largest response to an input: less of its derivatives is rounding ...
+DERIVATIVE_NOISE = 30.0  #: ... and below this times the error that was measured
+TRUSTED_ERROR = 1e-8  #: of the response: measured errors above it do not say what is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -152,7 +151,7 @@ def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflation:
     best: Deflation | None = None
     decisions: list[BlockDecision] = []
     for found in _proposals(model, tol, decisions):
-        if found.evidence.loss.value <= ENOUGH or tol is not None:
+        if found.evidence.loss.value <= ALLOWED_LOSS or tol is not None:
             return found
         if best is None or found.evidence.loss.value < best.evidence.loss.value:
             best = found
@@ -215,7 +214,9 @@ def _in_model_units(
     altered: bool,
 ) -> Deflation:
     losses = pencil.losses(result.equations)
-    known_to = np.maximum(losses.size, NOISE / ROUNDING * np.minimum(losses.error, TRUSTED * losses.size))
+    known_to = np.maximum(
+        losses.size, DERIVATIVE_NOISE / DERIVATIVE_ROUNDING * np.minimum(losses.error, TRUSTED_ERROR * losses.size)
+    )
     counts = [] if relaxation.offsets is None else relaxation.offsets.equations.tolist()
     return Deflation(
         model=model,
@@ -225,7 +226,7 @@ def _in_model_units(
             differentiations={model.dofs[i]: int(count) for i, count in enumerate(counts) if count > 0},
         ),
         equations=in_model_units(result, units),
-        rounding=rounding_in_model_units(result, units, known_to, ROUNDING),
+        rounding=rounding_in_model_units(result, units, known_to, DERIVATIVE_ROUNDING),
         evidence=Evidence(
             decisions=tuple([_decision(model, decision) for decision in relaxation.decisions]),
             rcond=result.rcond,
@@ -251,12 +252,12 @@ def _names(model: SecondOrderModel, places: IndexArray) -> tuple[str, ...]:
 
 
 def _singular_error(model: SecondOrderModel, pencil: ScaledPencil) -> SingularPencilError:
-    null = null_spaces(pencil.at(NEAR[0])[0])
+    null = null_spaces(pencil.at(NEAR_POINTS[0])[0])
     return singular_pencil_error(
         dofs=_names(model, np.array(sorted(frozenset().union(*null.unknowns)), dtype=np.intp)),
         equations=_names(model, np.array(sorted(frozenset().union(*null.equations)), dtype=np.intp)),
         fact="to working precision",
-        causes=causes(null, (model.K, model.C, model.M), model.dofs),
+        causes=causes(null, model.quadratics.P, model.dofs),
     )
 
 

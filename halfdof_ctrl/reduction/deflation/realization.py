@@ -1,4 +1,4 @@
-"""State space of any regular pencil: the road for index above one.
+"""State space of any regular pencil: the method for index above one.
 
 `relaxation` turns ``P(s) q = B(s) u`` into equations whose tight coefficients J, of the powers d_j - c_i of the
 offsets (15), are nonsingular. Equation i and its first c_i derivatives then hold. At level l = 0, 1, ...
@@ -28,8 +28,8 @@ from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, unit
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 from halfdof_ctrl.reduction.method.units import Units
 
-PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
-CERTAIN = 1e4  #: mean rounding errors beyond which a coefficient is not one
+STATE_PIVOT_SHARE = 0.3  #: of the largest pivot, from which on a later unknown is no state
+CERTAIN_COEFFICIENT = 1e4  #: mean rounding errors beyond which a coefficient is not one
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -55,7 +55,7 @@ class _Uncertain:
     def zeros(cls, *shape: int) -> "_Uncertain":
         return cls(np.zeros(shape), np.zeros(shape))
 
-    def add_product(self, place: IndexArray, left: "_Uncertain", right: "_Uncertain") -> None:
+    def subtract_product(self, place: IndexArray, left: "_Uncertain", right: "_Uncertain") -> None:
         """Subtract ``left @ right`` from some rows."""
         self.value[place] -= left.value @ right.value
         sizes = left.value**2
@@ -137,7 +137,7 @@ def rounding_in_model_units(realization: Realization, units: Units, columns: Flo
     """
     scaled = realization.equations
     q = scaled.displacement
-    known = [np.minimum(columns, CERTAIN / relative * error) for error in realization.errors]
+    known = [np.minimum(columns, CERTAIN_COEFFICIENT / relative * error) for error in realization.errors]
     sizes_of_inputs = tuple([np.maximum(np.abs(part), size) for part, size in zip(q.U, known, strict=False)])
     sizes = StateEquations(
         A=np.abs(scaled.A),
@@ -172,7 +172,7 @@ class Chain:
             columns = columns[::-1]
             part = unit_free(system, offsets, J, rows, columns).matrix
             part = part / np.abs(part).max(axis=1, keepdims=True, initial=0.0)
-            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, PIVOT_SHARE)
+            picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, STATE_PIVOT_SHARE)
             determined.append(np.sort(columns[picked]))
         return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
 
@@ -217,7 +217,7 @@ class Chain:
                 order = k + times - level
                 if order < len(found.value) and T[k, chosen, :n].any():
                     left = _Uncertain(T[k, chosen, :n], V[k, chosen, :n])
-                    right.add_product(place, left, _Uncertain(found.value[order], found.square[order]))
+                    right.subtract_product(place, left, _Uncertain(found.value[order], found.square[order]))
                 first = N + m * order
                 right.value[place, first : first + m] += T[k, chosen, n:]
                 right.square[place, first : first + m] += V[k, chosen, n:]

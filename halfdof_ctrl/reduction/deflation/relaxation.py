@@ -20,14 +20,14 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
+from halfdof_ctrl.reduction.algebra.blocks import RANK_TOLERANCE
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold
 from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks, structural_offsets
-from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, levelled
+from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, level_scaled
 
-RANK_TOLERANCE = 16 * EPS  #: times a block's size: singular values below this part of the largest are zero
-PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
-UNCLEAR = 100.0  #: singular values above the bound and below this times it may be either
-SNAP = 4.0  #: root mean square errors within which a shorter multiplier is as good
+ROW_PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
+UNCLEAR_TIGHT_RANK = 100.0  #: singular values above the bound and below this times it may be either
+SHORTER_MULTIPLIER = 4.0  #: root mean square errors within which a shorter multiplier is as good
 FINEST_DYADIC = 10  #: multipliers within rounding of a multiple of 2^-10 are taken as that
 
 
@@ -114,7 +114,7 @@ class _Block:
         tol: float | None,
     ) -> "_Block":
         place = np.ix_(rows, columns)
-        scaled = levelled(system, offsets, J, rows, columns)
+        scaled = level_scaled(system, offsets, J, rows, columns)
         factors = scaled.rows[:, None] * scaled.columns
         variance = offsets.tight(system.variance[:, :, : system.size])[place] * factors**2
         matrix, row_factors = scaled.matrix, scaled.rows
@@ -127,7 +127,7 @@ class _Block:
             variance = variance * weights[:, None] ** 2
             values = scipy.linalg.svdvals(matrix)
         if tol is None:
-            bound = gap_threshold(values, bound, bound * UNCLEAR)
+            bound = gap_threshold(values, bound, bound * UNCLEAR_TIGHT_RANK)
         decision = BlockDecision(
             unknowns=columns,
             singular_values=values,
@@ -152,7 +152,7 @@ class _Block:
             group = np.flatnonzero(self.times == times)
             values = scipy.linalg.svdvals(self.matrix[self.times >= times])
             rank = int(np.count_nonzero(values > self.decision.bound))
-            picked = independent_rows(self.matrix[group], self.matrix[taken], rank - len(taken), PIVOT_SHARE)
+            picked = independent_rows(self.matrix[group], self.matrix[taken], rank - len(taken), ROW_PIVOT_SHARE)
             taken.extend(group[picked].tolist())
             found.extend(self._expressed(np.setdiff1d(group, group[picked]), np.array(taken, dtype=np.intp)))
         return found
@@ -169,7 +169,7 @@ class _Block:
             noise = self.variance[dependent].sum(axis=1) + self.variance[sources].sum(axis=1) @ x**2
             error = np.maximum(EPS * np.abs(x), sensitivity * np.sqrt(noise))
         ratio = self.row_factors[sources][:, None] / self.row_factors[dependent]
-        multipliers, errors = _shortest_dyadic(x * ratio, SNAP * error * ratio), error * ratio
+        multipliers, errors = _shortest_dyadic(x * ratio, SHORTER_MULTIPLIER * error * ratio), error * ratio
         return [
             Elimination(
                 row=row,

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, levelling_factors
+from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, level_scaling
 from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
 from halfdof_ctrl.reduction.method.units import ScaledRows
 
-DOUBTFUL = 1e5  #: entries above the caution and below this times it may be either
+DOUBTFUL_ENTRY = 1e5  #: entries above the caution and below this times it may be either
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +120,13 @@ def unit_free(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArr
     return ScaledPart(J[np.ix_(rows, columns)] * r[:, None] * c, r, c)
 
 
-def levelled(system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray) -> ScaledPart:
+def level_scaled(
+    system: RowSystem, offsets: Offsets, J: FloatArray, rows: IndexArray, columns: IndexArray
+) -> ScaledPart:
     """Scale a part of J so that it is the same in any units and its rows and columns are near one."""
     part = unit_free(system, offsets, J, rows, columns)
-    r, c = levelling_factors(part.matrix)
-    return ScaledPart(part.matrix * r[:, None] * c, part.rows * r, part.columns * c)
+    scaling = level_scaling(part.matrix)
+    return ScaledPart(scaling.of(part.matrix), part.rows * scaling.rows, part.columns * scaling.columns)
 
 
 def shifts_of(offsets: Offsets, eliminations: list[Elimination]) -> list[IndexArray]:
@@ -146,4 +148,4 @@ def _is_rounding(row: FloatArray, square: FloatArray, caution: Caution) -> BoolA
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(row != 0.0, np.abs(row) / np.sqrt(square), 0.0)
-    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL))
+    return np.asarray(ratio <= gap_threshold(ratio, caution.entry, caution.entry * DOUBTFUL_ENTRY))

@@ -42,7 +42,7 @@ def orthonormal_bases(
     model : SecondOrderModel
         A real model.
     tol : float, optional
-        Singular values of an equilibrated block at most `tol` times its largest count as zero; by
+        Singular values of a scaled block at most `tol` times its largest count as zero; by
         default 16 eps times the block's size.
     widest : float, optional
         A block whose singular values lie further apart than this is mixed although none of them is zero, so that

@@ -10,25 +10,24 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR, LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
+from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, LeadingMatrix
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
-from halfdof_ctrl.reduction.method.evidence import CLOSE, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal
 
-NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
-LOST = 1e-9  #: by the rounding of A and B at most, from which on other coordinates are tried ...
-LOOKED_AT = 1e-12  #: ... where that much is lost indeed
+LOSS_LOOKED_AT = 1e-12  #: other coordinates are tried only where that much is lost indeed, whatever the bound says
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -70,7 +69,7 @@ class SingleSolve:
             light=self.coordinates.light,
             rcond=rcond,
             loss=self.loss,
-            hardly=rcond < CLOSE * n * SINGULAR,
+            hardly=rcond < CLOSE_GAP * n * SINGULAR_RCOND,
         )
 
     @property
@@ -113,7 +112,7 @@ class SingleSolve:
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates and the singular values of W."""
         values = self.leading.singular_values()
-        bound = len(values) * SINGULAR * float(values.max(initial=0.0))
+        bound = len(values) * SINGULAR_RCOND * float(values.max(initial=0.0))
         regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
         return (*self.coordinates.evidence, regular)
 
@@ -188,7 +187,7 @@ def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolv
     if tol is not None or (found.leading.is_plainly_regular and found.coordinates.basis is None):
         return found
     measured = replace(found, loss=measured_loss(found))
-    if asked or measured.loss.value < LOOKED_AT:
+    if asked or measured.loss.value < LOSS_LOOKED_AT:
         return measured
     better = _in_better_coordinates(found)
     return measured if better is None else replace(better, loss=measured_loss(better))
@@ -200,7 +199,7 @@ def _in_better_coordinates(found: SingleSolve) -> SingleSolve | None:
     That is decided by bounds and not by what was measured, so that the choice is the same in any units.
     """
     model, lost = found.model, expected_loss(found.model, found.equations)
-    if lost <= LOST:
+    if lost <= ALLOWED_LOSS:
         return None
     other = _solved(model, orthonormal_bases(model, widest=SPREAD))
     if other is None or len(other.A) != len(found.A) or expected_loss(model, other.equations) > SAVED * lost:
@@ -212,8 +211,7 @@ def _singular_error(
     model: SecondOrderModel, partition: DofPartition, W: FloatArray, leading: LeadingMatrix
 ) -> SingularLeadingMatrixError:
     """Make the refusal of a singular W, naming the DOFs of its null vector."""
-    rows, columns = equilibrating_factors(W)
-    _, _, right = scipy.linalg.svd(W * rows[:, None] * columns)
+    _, _, right = scipy.linalg.svd(max_scaling(W).of(W))
     null = np.abs(right[-1])
     concerned = partition.T[:, null > NULL_VECTOR_SHARE * null.max()].any(axis=1)
     dofs = tuple([model.dofs[index] for index in np.flatnonzero(concerned).tolist()])

@@ -8,15 +8,15 @@ others, sections 2.1 to 2.3.
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, is_zero, read_only, unit_matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import connected_columns
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import logarithmic_scaling
+from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
-ROUNDING = 32 * np.finfo(float).eps  #: times n: what a solution of (3) is known to, of its largest scaled unknown
+SOLVE_ROUNDING = 32 * EPS  #: times n: what a solution of (3) is known to, of its largest scaled unknown
 
 
 def leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatArray:
@@ -33,7 +33,7 @@ def solved_at_once(model: SecondOrderModel, partition: DofPartition, leading: Le
     """Solve (3) for everything on its right-hand side."""
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     m, N = model.B.shape[1], moving + n_i
-    forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed((model.B, model.Bv, model.Ba))
+    forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed(model.quadratics.B)
     right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
     np.negative(partition.times_basis(model.K, 0, moving), out=right[:, :moving])
     np.negative(partition.times_basis(model.C, 0, n_i), out=right[:, moving:N])
@@ -60,7 +60,7 @@ def rounding_of_solve(
     scaled to be the same in any units; of the largest one among unknowns that W connects, since others have neither
     errors nor units in common.
     """
-    row_logs, _, _ = logarithmic_scaling(np.stack([model.K, model.C, model.M]))
+    row_logs, _, _ = log_scaling_with_time(np.stack(model.quadratics.P))
     W = leading_columns(model, partition)
     scale = 1.0 / np.abs(np.exp2(row_logs)[:, None] * W).max(axis=0)[:, None]
     parts = connected_columns(W)
@@ -81,13 +81,13 @@ def rounding_of_solve(
     X[:, :moving] = np.maximum(X[:, :moving], known_to[:, :moving])
     X = np.maximum(X, known_to[:, moving:] @ free[moving:])
     rates, statics = [], []
-    for force in (model.B, model.Bv, model.Ba):
+    for force in model.quadratics.B:
         size = sizes_of_solution(force)
         rates.append(np.vstack([np.zeros_like(size[:n_i]), size[n_i:moving], size[:n_i]]))
         statics.append(known_to[:, moving:] @ size[moving:])
     shift = rates[1] + A @ rates[2]
     return Rounding(
-        relative=ROUNDING * len(model.dofs),
+        relative=SOLVE_ROUNDING * len(model.dofs),
         A=A,
         B=rates[0] + A @ shift,
         displacement=Signal(X, (statics[0] + X @ shift, statics[1] + X @ rates[2], statics[2])),

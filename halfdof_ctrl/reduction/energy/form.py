@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, FloatArray, IndexArray, is_zero, read_only
+from halfdof_ctrl.base.arrays import EPS, LARGEST_DENSE_COPY, FloatArray, IndexArray, is_zero, read_only
 from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -132,7 +132,7 @@ def _mass_error(model: SecondOrderModel, parts: Parts) -> EnergyFormError:
     scale = 1.0 / np.where(size > 0.0, size, 1.0)
     values, vectors = np.linalg.eigh(scale[:, None] * M * scale)
     dofs = [model.dofs[parts.inertial[j]] for j in np.argsort(-np.abs(vectors[:, 0]), kind="stable")[:8].tolist()]
-    if values[0] < -len(M) * np.finfo(float).eps:
+    if values[0] < -len(M) * EPS:
         return indefinite_error("M", dofs)
     msg = (
         f"There are no energy coordinates in terms of DOFs: the mass among DOFs {', '.join(dofs)} is singular "
@@ -245,7 +245,7 @@ class _Assembly:
     def _inputs(self) -> list[FloatArray]:
         """Return what the inputs, their first and second derivatives do to q_r, static DOFs condensed."""
         model, static, moving = self.model, self.parts.static, self.parts.moving
-        given = trimmed((model.B, model.Bv, model.Ba)) or (model.B,)
+        given = trimmed(model.quadratics.B) or (model.B,)
         return [
             B[moving] - self.U_kr.T @ solved(self.U_kk, B[static], transposed=True) if static.size else B[moving]
             for B in given
@@ -265,7 +265,7 @@ class _Assembly:
         v_r[self.i, n_p + n_m + n_z :] = solved(self.mass, free.complement)
         v_r[self.c] = self.half
         v_r[:, n_p : n_p + n_m] += free.carried
-        inputs = [np.asarray(B, dtype=float) for B in trimmed((model.B, model.Bv, model.Ba))]
+        inputs = [np.asarray(B, dtype=float) for B in trimmed(model.quadratics.B)]
         to_half = [np.zeros((n_r, m)) for _ in inputs]
         for place, of_half in zip(to_half, self.driven_half, strict=False):
             place[self.c] = of_half
@@ -310,7 +310,7 @@ class _Assembly:
 
 def motion_output(model: SecondOrderModel, A: FloatArray, B: FloatArray, q: Signal, v: Signal) -> Signal:
     """Return the model's outputs from displacements and velocities that are known as functions of the state."""
-    output = Signal(np.zeros((len(model.outputs), len(A))), trimmed((model.D, model.Dv, model.Da)))
+    output = Signal(np.zeros((len(model.outputs), len(A))), trimmed(model.quadratics.D))
     for matrix, motion in ((model.F, q), (model.G, v)):
         if not is_zero(matrix):
             output = output.plus(motion.combined(matrix))

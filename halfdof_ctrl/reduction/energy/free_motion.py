@@ -20,7 +20,7 @@ from halfdof_ctrl.base.matrix_residual import exact_product
 from halfdof_ctrl.reduction.energy.cholesky import solved
 from halfdof_ctrl.reduction.energy.rigid import StiffnessFactor
 
-MASSLESS = 64.0  #: times n eps of the terms: a smaller momentum of a free motion is rounding
+MASSLESS_MOMENTUM = 64.0  #: times n eps of the terms: a smaller momentum of a free motion is rounding
 BALANCED_FORCES = 4 * EPS  #: of the terms: forces of dampers that cancel to this part are rounding of their entries
 
 
@@ -82,7 +82,7 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
     order = decomposed[2]
     terms = np.linalg.norm(np.abs(mass) @ np.abs(motions[i]), axis=0)[order]
     length = np.array([np.linalg.norm(triangle[k:, k]) if k < n_i else 0.0 for k in range(d)])
-    n_m = int(np.count_nonzero(length > MASSLESS * len(C) * EPS * terms))
+    n_m = int(np.count_nonzero(length > MASSLESS_MOMENTUM * len(C) * EPS * terms))
     corner, beside = triangle[:n_m, :n_m], triangle[:n_m, n_m:]
     turned = motions[:, order]
     with_mass = solved(corner, turned[:, :n_m].T, transposed=True).T

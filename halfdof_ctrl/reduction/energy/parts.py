@@ -18,8 +18,8 @@ from halfdof_ctrl.base.matrix_residual import exact_residual
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-SAME = 4 * EPS  #: entries above and below the diagonal that differ by this part of the larger one differ by rounding
-TURNED = 16 * EPS  #: the same for this part of their diagonal entries: rounding of T^T K T with elements at an angle
+SAME_ENTRY = 4 * EPS  #: entries above and below the diagonal that differ by this part of the larger are the same
+TURNED_ENTRY = 16 * EPS  #: ... or by this part of their diagonal entries: T^T K T with elements at an angle, rounded
 SINGULAR_DAMPING = 16.0  #: times n eps: a smaller reciprocal condition number of C_cc is rounding
 
 
@@ -67,7 +67,7 @@ def _symmetric(matrix: npt.NDArray[np.float64], letter: Literal["M", "K"], dofs:
     larger = np.maximum(np.abs(matrix), np.abs(matrix.T))
     gap = np.abs(matrix - matrix.T)
     size = np.sqrt(np.abs(np.diagonal(matrix)))
-    if (gap <= np.maximum(SAME * larger, TURNED * np.outer(size, size))).all():
+    if (gap <= np.maximum(SAME_ENTRY * larger, TURNED_ENTRY * np.outer(size, size))).all():
         return (matrix + matrix.T) / 2.0 if gap.any() else np.asarray(matrix, dtype=float)
     row, column = np.unravel_index(int(np.argmax(gap / np.where(larger > 0.0, larger, 1.0))), gap.shape)
     names = (dofs[int(row)], dofs[int(column)])

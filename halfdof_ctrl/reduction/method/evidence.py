@@ -13,8 +13,8 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.reduction.algebra.blocks import BlockSplit
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss
 
-CLOSE = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
-LOST = 1e-9  #: a state space that loses more than this against a direct solve is warned of
+CLOSE_GAP = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
+ALLOWED_LOSS = 1e-9  #: against a direct solve: above it other ways are tried, and what is kept is warned of
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
 
 
@@ -122,7 +122,7 @@ def _warn_of_hardly_regular(rcond: float) -> None:
 
 def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
     """Warn where what is stored loses more than 1e-9 of a channel."""
-    if loss.value > LOST:
+    if loss.value > ALLOWED_LOSS:
         msg = (
             f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.value:.1e} of the "
             f"transfer function, at {loss.omega:.3g} rad/s: the equations for the highest derivatives are ill "
@@ -135,7 +135,7 @@ def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
     """Warn of decisions that rest on singular values less than 1e3 apart, and of zeros that are more than rounding."""
     for decision in evidence:
         values, rank = decision.singular_values, decision.rank
-        if decision.gap < CLOSE:
+        if decision.gap < CLOSE_GAP:
             zero = f"{values[rank]:.1e} as zero" if rank < values.size else f"none as zero (bound {decision.bound:.1e})"
             msg = (
                 f"A decision about a rank is close: of the singular values of a block of {decision.matrix}, "

@@ -27,15 +27,15 @@ from halfdof_ctrl.reduction.method.signals import Signal
 
 FEW_STATES = 60  #: up to which all eigenvalues are computed to choose the frequencies
 SLOW_MODES = 6  #: of more states, that are looked for
-COARSE = 1e-3  #: accuracy of these
+SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
 MOST_POINTS = 4  #: frequencies at which the loss is measured
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-BESIDE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
+BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are looked for if A is singular
 ROUNDINGS = 2  #: of M, C, K at random
-ZERO = 100.0  #: times what these change in it: a smaller channel is zero
-SPARSE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
+ZERO_CHANNEL = 100.0  #: times what these change in it: a smaller channel is zero
+SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,12 +102,12 @@ def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
     """Return below which size a channel is zero but for rounding, in units that rows and columns have."""
     rows = largest.max(axis=1, keepdims=True)
     across = np.divide(largest, rows, out=np.zeros_like(largest), where=rows > 0.0).max(axis=0)
-    return np.asarray(ZERO * EPS * rows * across)
+    return np.asarray(ZERO_CHANNEL * EPS * rows * across)
 
 
 def equation_of_motion(model: SecondOrderModel) -> ExactPolynomial:
     """Return P(s) = K + C s + M s^2 for residuals in twice the working precision."""
-    return ExactPolynomial([_as_it_is(matrix) for matrix in (model.K, model.C, model.M)])
+    return ExactPolynomial([_as_it_is(matrix) for matrix in model.quadratics.P])
 
 
 def loss_points(A: FloatArray) -> ComplexArray:
@@ -117,7 +117,7 @@ def loss_points(A: FloatArray) -> ComplexArray:
     moving = moving[np.argsort(np.abs(moving))]
     swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
     chosen = np.concatenate([swinging[: MOST_POINTS - 1], real[:1]])
-    return np.asarray(1j * BESIDE * (chosen if chosen.size else np.ones(1)))
+    return np.asarray(1j * BESIDE_MODE * (chosen if chosen.size else np.ones(1)))
 
 
 def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
@@ -137,13 +137,15 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     )
     start = np.random.default_rng(0).standard_normal(N)
     try:
-        found = eigs(inverse, k=SLOW_MODES, v0=start, tol=COARSE, return_eigenvectors=False)
+        found = eigs(inverse, k=SLOW_MODES, v0=start, tol=SLOW_MODES_ACCURACY, return_eigenvectors=False)
     except ArpackNoConvergence as some:
         found = np.asarray(some.eigenvalues)
     except ArpackError:
         found = np.zeros(0, dtype=complex)
     poles = np.asarray(shift + 1.0 / found[found != 0.0], dtype=np.complex128)
-    return poles, np.full(poles.size, (AT_ORIGIN if shift == 0.0 else COARSE) * np.abs(poles).max(initial=0.0))
+    return poles, np.full(
+        poles.size, (AT_ORIGIN if shift == 0.0 else SLOW_MODES_ACCURACY) * np.abs(poles).max(initial=0.0)
+    )
 
 
 def _lost_at(
@@ -158,17 +160,17 @@ def _lost_at(
     q = np.empty((len(model.dofs), chosen.size), dtype=np.complex128)
     q.real = stored.motion_at(x.real.copy(), [power.real * unit for power in powers], 0)
     q.imag = stored.motion_at(x.imag.copy(), [power.imag * unit for power in powers], 0)
-    rest = equation.residual(s, q, _at((model.B, model.Bv, model.Ba), s, chosen))
-    value = _at((model.D, model.Dv, model.Da), s, chosen) + _seen(model, s, q)
+    rest = equation.residual(s, q, _at(model.quadratics.B, s, chosen))
+    value = _at(model.quadratics.D, s, chosen) + _seen(model, s, q)
     said = np.asarray(output.X @ x)
     for power, part in zip(powers, output.U, strict=False):
         said = said + power * part[:, chosen]
     missed = np.asarray(value - said + _seen(model, s, stored.answer(states, rest)))
-    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate((model.K, model.C, model.M)))
+    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate(model.quadratics.P))
     generator = np.random.default_rng(0)
     rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(ROUNDINGS)]
     data = [np.abs(_seen(model, s, stored.answer(states, force.astype(np.complex128)))) for force in rounded]
-    return np.abs(missed), np.abs(value), ZERO * np.max(data, axis=0)
+    return np.abs(missed), np.abs(value), ZERO_CHANNEL * np.max(data, axis=0)
 
 
 class StateSolver:
@@ -230,7 +232,7 @@ def _derivatives(A: FloatArray) -> int:
 
 def _seen(model: SecondOrderModel, s: complex, q: ComplexArray) -> ComplexArray:
     """Return ``F(s) q``."""
-    parts = [s**power * np.asarray(part @ q) for power, part in enumerate((model.F, model.G, model.H))]
+    parts = [s**power * np.asarray(part @ q) for power, part in enumerate(model.quadratics.F)]
     return np.asarray(parts[0] + parts[1] + parts[2])
 
 
@@ -244,5 +246,5 @@ def _at(coefficients: Sequence[Matrix], s: complex, columns: IndexArray) -> Comp
 
 def _as_it_is(matrix: Matrix) -> Matrix:
     """Return a dense matrix with few entries as a sparse one."""
-    few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < SPARSE * matrix.size
+    few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size
     return csc_array(matrix) if few else matrix

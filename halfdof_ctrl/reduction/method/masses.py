@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.scaling import time_log, unit_free_factors
+from halfdof_ctrl.reduction.algebra.scaling import time_log, unit_free_scaling
 
 PLAIN_SPREAD = 1e5  #: of stiffness over mass between the DOFs; a smaller one needs no closer look
 
@@ -28,8 +28,7 @@ def mass_ratios(model: SecondOrderModel) -> FloatArray:
     """
     M, C, K = (np.abs(matrix) for matrix in (model.M, model.C, model.K))
     gamma = slowest_speed(model)
-    rows, columns = unit_free_factors(K + gamma * C + gamma**2 * M)
-    mass = (M * rows[:, None] * columns).max(axis=0)
+    mass = unit_free_scaling(K + gamma * C + gamma**2 * M).of(M).max(axis=0)
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)
 
 
@@ -51,7 +50,7 @@ def slowest_speed(model: SecondOrderModel) -> float:
     speeds = own_speeds(model)
     if (speeds > 0.0).any():
         return float(np.sqrt(speeds[speeds > 0.0].min()))
-    return float(np.exp2(time_log([model.K, model.C, model.M])))
+    return float(np.exp2(time_log(model.quadratics.P)))
 
 
 def spread_is_wide(model: SecondOrderModel, inertial: npt.NDArray[np.bool_]) -> bool:

@@ -14,21 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import balanced, balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.integers import as_integers, log_determinant
-from halfdof_ctrl.reduction.algebra.scaling import equilibrating_factors
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, as_integers, log_determinant
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 from halfdof_ctrl.reduction.method.units import ScaledRows, Units, scaled_rows
 
-NEAR = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
-EPS = float(np.finfo(float).eps)
-LARGEST_EXACT = 60  #: equations up to which determinants may be formed in integers
-DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
-SINGULAR = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
-AXIS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
-DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
+NEAR_POINTS = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
+RATIO_DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
+SINGULAR_PENCIL = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
+AXIS_POINTS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
+SOLVE_DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,28 +53,28 @@ class ScaledPencil:
 
     def is_singular(self) -> bool:
         """Whether P(s) is singular to working precision at all points."""
-        return all(self._smallest(s) <= SINGULAR * self.P.shape[1] for s in NEAR)
+        return all(self._smallest(s) <= SINGULAR_PENCIL * self.P.shape[1] for s in NEAR_POINTS)
 
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""
         fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
         beyond = 1 + math.frexp(max(fastest, 1.0))[1]  # powers of two, so that P(s) can be formed exactly
-        points = [*NEAR, *(2.0**power for power in (beyond, beyond + 1))]
+        points = [*NEAR_POINTS, *(2.0**power for power in (beyond, beyond + 1))]
         unit = np.eye(len(A))
         of_A = np.array([np.linalg.slogdet(s * unit - A)[1] for s in points])
         of_P = np.array([self._log_determinant(s) for s in points])
-        if np.ptp(of_P - of_A) > DRIFT and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
+        if np.ptp(of_P - of_A) > RATIO_DRIFT and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
             integers, scale = as_integers(self.P)
             for place, power in ((-2, beyond), (-1, beyond + 1)):
                 exact = integers[0] + (integers[1] << power) + (integers[2] << 2 * power)
                 of_P[place] = log_determinant(exact) - self.P.shape[1] * scale * math.log(2.0)
-        return bool(np.ptp(of_P - of_A) <= DRIFT)
+        return bool(np.ptp(of_P - of_A) <= RATIO_DRIFT)
 
     def _log_determinant(self, s: complex) -> float:
         P, _ = self.at(s)
-        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
-        scale = float(np.log(rows).sum() + np.log(columns).sum())
-        return float(np.linalg.slogdet(P * rows[:, None] * columns)[1]) - scale
+        scaling = max_scaling(np.abs(P), even=2.0)
+        scale = float(np.log(scaling.rows).sum() + np.log(scaling.columns).sum())
+        return float(np.linalg.slogdet(scaling.of(P))[1]) - scale
 
     def losses(self, equations: StateEquations) -> "Losses":
         """Compare the state equations, balanced, with direct solves at the points on the axis."""
@@ -84,9 +82,9 @@ class ScaledPencil:
         A, factors = balanced_states(equations.A)
         into, X = equations.B / factors[:, None], equations.displacement.X * factors
         size, error, worst = np.zeros(m), np.zeros(m), 0.0
-        for s in AXIS:
+        for s in AXIS_POINTS:
             P, B = self.at(s)
-            rows, columns = (factors[:, None] for factors in equilibrating_factors(np.abs(P), even=2.0))
+            rows, columns = (factors[:, None] for factors in max_scaling(np.abs(P), even=2.0))
             matrix = P * rows * columns.T
             try:
                 direct = columns * np.linalg.solve(matrix, rows * B)
@@ -100,21 +98,21 @@ class ScaledPencil:
             F, output = _at(self.F, s), _at(self.F, s) @ direct + _at(self.D, s)
             lost = float(np.abs(F @ (found - direct)).max())
             doubt = float((np.abs(F) @ columns).max() * (np.abs(direct) / columns).max()) * np.linalg.cond(matrix)
-            if output.any() and lost > DOUBT * len(matrix) * doubt:
+            if output.any() and lost > SOLVE_DOUBT * len(matrix) * doubt:
                 worst = max(worst, lost / float(np.abs(output).max()))
         return Losses(size, error, worst)
 
     def expected_loss(self, equations: StateEquations) -> float:
-        """Bound what rounding A and B to double precision makes of the outputs, relative to the largest, at AXIS.
+        """Bound what rounding A and B to double precision makes of the outputs, relative to the largest.
 
-        Entry by entry, ``eps |F X (s I - A)^-1| (|A| |x| + |B|)``: the same in any units of the states, and, unlike a
-        measured error, the same for models that differ by rounding.
+        At the points on the axis, entry by entry, ``eps |F X (s I - A)^-1| (|A| |x| + |B|)``: the same in any units of
+        the states, and, unlike a measured error, the same for models that differ by rounding.
         """
         N = len(equations.A)
         A, factors = balanced_states(equations.A)
         into, X = equations.B / factors[:, None], equations.displacement.X * factors
         worst = 0.0
-        for s in AXIS:
+        for s in AXIS_POINTS:
             F, unit = _at(self.F, s), np.eye(N)
             try:
                 inverse = np.linalg.solve(s * unit - A, unit + 0j)
@@ -131,8 +129,7 @@ class ScaledPencil:
 
     def _scaled(self, s: complex) -> ComplexArray:
         P, _ = self.at(s)
-        rows, columns = equilibrating_factors(np.abs(P), even=2.0)
-        return np.asarray(P * rows[:, None] * columns)
+        return np.asarray(max_scaling(np.abs(P), even=2.0).of(P))
 
     def _smallest(self, s: complex) -> float:
         values = np.linalg.svd(self._scaled(s), compute_uv=False)
@@ -178,13 +175,13 @@ def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tupl
 
 def scaled_pencil(model: SecondOrderModel) -> tuple[ScaledRows, Units, ScaledPencil]:
     """Return the rows of a model in scaled units, the units, and the pencil to be proved against."""
-    rows, units = scaled_rows(np.stack([model.K, model.C, model.M]), np.stack([model.B, model.Bv, model.Ba]))
+    rows, units = scaled_rows(np.stack(model.quadratics.P), np.stack(model.quadratics.B))
     n = len(model.dofs)
     powers = np.arange(3)[:, None, None]
     pencil = ScaledPencil(
         P=rows.coefficients[:, :, :n],
         B=rows.coefficients[:, :, n:],
-        F=units.by_time(np.stack([model.F, model.G, model.H]) * units.columns, powers),
-        D=units.by_time(np.stack([model.D, model.Dv, model.Da]) * units.inputs, powers),
+        F=units.by_time(np.stack(model.quadratics.F) * units.columns, powers),
+        D=units.by_time(np.stack(model.quadratics.D) * units.inputs, powers),
     )
     return rows, units, pencil

@@ -126,7 +126,7 @@ def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: 
     if not is_zero(model.H):
         velocity = q.combined(model.H).derivative(equations.A, equations.B)
         output = output.plus(velocity.derivative(equations.A, equations.B))
-    direct = trimmed((model.D, model.Dv, model.Da))
+    direct = trimmed(model.quadratics.D)
     if direct:
         output = output.plus(Signal(np.zeros_like(output.X), direct))
     if len(output.U) <= 1:

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
-from halfdof_ctrl.reduction.algebra.scaling import logarithmic_scaling
+from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -39,7 +39,7 @@ class ScaledRows:
 
 def scaled_rows(P: FloatArray, B: FloatArray) -> tuple[ScaledRows, Units]:
     """Scale coefficients (3, n, n) and (3, n, m) by powers of two: P near the unit-free scaling, inputs near one."""
-    row_logs, column_logs, time_log = logarithmic_scaling(P)
+    row_logs, column_logs, time_log = log_scaling_with_time(P)
     row_powers, column_powers, time_power = np.round(row_logs), np.round(column_logs), np.round(time_log)
     speed = np.exp2(time_power * np.arange(len(P)))[:, None, None]
     rows = np.exp2(row_powers)[:, None]

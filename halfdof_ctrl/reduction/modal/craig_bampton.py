@@ -21,13 +21,13 @@ from halfdof_ctrl.reduction.modal.modes import Modes, ShiftedStiffness, count_be
 
 Parts = Mapping[str, SparseMatrix]  #: matrices of a model by their letters
 
-MARGIN = 2.0  #: modes with b held are kept up to this factor above the highest frequency of the band
+KEPT_MODES_MARGIN = 2.0  #: modes with b held are kept up to this factor above the highest frequency of the band
 MOST_MODES = 2000  #: that are kept
 MOST_KEPT = 1000  #: DOFs that are kept
-MOST_ENTRIES = 2**28  #: of the dense matrix of motions that the model is projected on (2 GB)
-LOCAL = 6  #: DOFs of an input or output up to which these are kept; one that touches more gets a static correction
-DEPENDENT = 1e-10  #: of the largest eigenvalue of their energies: combinations of static corrections below are none
-SPECK = 1e-14  #: of the largest motion of a DOF that follows a kept one: motions below are rounding
+MOST_MOTION_ENTRIES = 2**28  #: of the dense matrix of motions that the model is projected on (2 GB)
+LOCAL_SIGNAL = 6  #: DOFs of an input or output up to which these are kept; one of more gets a static correction
+DEPENDENT_CORRECTIONS = 1e-10  #: of the largest eigenvalue of their energies: combinations of them below are none
+MOTION_SPECK = 1e-14  #: of the largest motion of a DOF that follows a kept one: motions below are rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,7 +71,7 @@ def _kept_dofs(parts: Parts) -> tuple[IndexArray, SparseMatrix]:
     spread = []
     for part in columns:
         touched = np.diff(part.indptr)
-        local = touched <= LOCAL
+        local = touched <= LOCAL_SIGNAL
         kept[part[:, np.flatnonzero(local)].indices] = True
         spread.append(part[:, np.flatnonzero(~local)])
     lumps = lumped_damping(parts["M"], parts["C"], parts["K"])
@@ -79,7 +79,7 @@ def _kept_dofs(parts: Parts) -> tuple[IndexArray, SparseMatrix]:
     if damped.size <= MOST_KEPT:
         kept[damped] = True
     loads = csc_array(hstack(spread, format="csc"))
-    count, most = int(np.count_nonzero(kept)), min(MOST_KEPT, MOST_ENTRIES // (4 * kept.size))
+    count, most = int(np.count_nonzero(kept)), min(MOST_KEPT, MOST_MOTION_ENTRIES // (4 * kept.size))
     if max(count, loads.shape[1]) > most:
         msg = (
             f"{count} DOFs of inputs, outputs and dampers would be kept, and {loads.shape[1]} inputs and outputs are "
@@ -98,7 +98,7 @@ def _inner_stiffness(parts: Parts, inner: IndexArray, dofs: tuple[str, ...]) -> 
     stiffness = ShiftedStiffness.factorized(K, M)
     if stiffness is None:
         null = np.abs(SparseLU.factorized(csc_array(K + M)).null_vector())
-        loose = tuple([dofs[place] for place in inner[null > DEPENDENT * null.max()].tolist()])
+        loose = tuple([dofs[place] for place in inner[null > DEPENDENT_CORRECTIONS * null.max()].tolist()])
         msg = (
             f"With the kept DOFs held, DOFs {listed(loose)} still move without a force and without mass: nodes without "
             "springs, or a part that nothing holds. Remove them or give them a stiffness."
@@ -111,10 +111,10 @@ def _modes(stiffness: ShiftedStiffness | None, f_max: float | None, n_modes: int
     """Find the modes with the kept DOFs held: as many as wanted, or all up to beyond the band."""
     if stiffness is None:
         return Modes(np.zeros(0), np.zeros((0, 0)))
-    most = min(MOST_MODES, MOST_ENTRIES // (2 * stiffness.K.shape[0]))
-    count = (n_modes or 0) if f_max is None else count_below(stiffness, 2.0 * np.pi * MARGIN * f_max)
+    most = min(MOST_MODES, MOST_MOTION_ENTRIES // (2 * stiffness.K.shape[0]))
+    count = (n_modes or 0) if f_max is None else count_below(stiffness, 2.0 * np.pi * KEPT_MODES_MARGIN * f_max)
     if count > most:
-        which = "" if f_max is None else f", all below {MARGIN * f_max:.4g} Hz, twice f_max"
+        which = "" if f_max is None else f", all below {KEPT_MODES_MARGIN * f_max:.4g} Hz, twice f_max"
         msg = (
             f"{count} modes are to be kept{which}; the limit is {most} for a model of this size. Lower f_max, or take "
             "n_modes with what you can afford."
@@ -129,7 +129,7 @@ def _following(parts: Parts, stiffness: ShiftedStiffness | None, kept: IndexArra
         return np.zeros((0, kept.size))
     coupling = csc_array(parts["K"] - stiffness.sigma * parts["M"])[:, kept]
     follow = -stiffness.solve_sparse(csc_array(coupling.tocsr()[inner]), "kept DOFs")
-    follow[np.abs(follow) <= SPECK * np.abs(follow).max(axis=0, initial=0.0)] = 0.0
+    follow[np.abs(follow) <= MOTION_SPECK * np.abs(follow).max(axis=0, initial=0.0)] = 0.0
     return follow
 
 
@@ -150,11 +150,11 @@ def _corrections(stiffness: ShiftedStiffness | None, modes: Modes, loads: FloatA
     whole = np.einsum("ij,ij->j", motion, times(stiffness.K, motion))
     motion -= modes.shapes @ (modes.shapes.T @ times(stiffness.M, motion))
     rest = np.einsum("ij,ij->j", motion, times(stiffness.K, motion))
-    beyond = rest > DEPENDENT * whole
+    beyond = rest > DEPENDENT_CORRECTIONS * whole
     motion = motion[:, beyond] / np.sqrt(rest[beyond])
     energy = motion.T @ times(stiffness.K, motion)
     sizes, vectors = scipy.linalg.eigh((energy + energy.T) / 2.0)
-    kept = sizes > DEPENDENT * sizes.max(initial=0.0)
+    kept = sizes > DEPENDENT_CORRECTIONS * sizes.max(initial=0.0)
     motion = motion @ (vectors[:, kept] / np.sqrt(sizes[kept]))
     mass = motion.T @ times(stiffness.M, motion)  # and orthogonal in mass, so that what has none shows by itself
     return np.asarray(motion @ scipy.linalg.eigh((mass + mass.T) / 2.0)[1])

@@ -7,8 +7,8 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.model.sparse_evaluation import SparsePencil
 
-SAMPLES = 1001  #: pairs of entries from which alpha and beta are found
-ROUNDING = 1e-9  #: entries of C that differ from alpha M + beta K by this part of their terms are no dampers
+SAMPLED_ENTRIES = 1001  #: pairs of entries from which alpha and beta are found
+PROPORTIONAL_ROUNDING = 1e-9  #: entries of C that differ from alpha M + beta K by this part of their terms are zero
 
 
 def lumped_damping(M: SparseMatrix, C: SparseMatrix, K: SparseMatrix) -> SparseMatrix:
@@ -40,7 +40,7 @@ def lumped_damping(M: SparseMatrix, C: SparseMatrix, K: SparseMatrix) -> SparseM
     k, c, m = (np.zeros(pencil.indices.size) if part is None else part for part in pencil.values)
     alpha, beta = _proportions(m, c, k)
     rest = c - alpha * m - beta * k
-    rest[np.abs(rest) <= ROUNDING * (np.abs(c) + np.abs(alpha * m) + np.abs(beta * k))] = 0.0
+    rest[np.abs(rest) <= PROPORTIONAL_ROUNDING * (np.abs(c) + np.abs(alpha * m) + np.abs(beta * k))] = 0.0
     lumps = csc_array((rest, pencil.indices, pencil.indptr), shape=C.shape)
     lumps.eliminate_zeros()
     return lumps if lumps.nnz <= C.nnz / 2 else C
@@ -53,9 +53,9 @@ def _proportions(m: FloatArray, c: FloatArray, k: FloatArray) -> tuple[float, fl
     if massive.size == 0 or stiff.size == 0:
         of_mass = float(np.median(c[massive] / m[massive])) if massive.size else 0.0
         return of_mass, float(np.median(c[stiff] / k[stiff])) if stiff.size else 0.0
-    i, j = generator.choice(massive, SAMPLES), generator.choice(stiff, SAMPLES)
+    i, j = generator.choice(massive, SAMPLED_ENTRIES), generator.choice(stiff, SAMPLED_ENTRIES)
     determinant = m[i] * k[j] - m[j] * k[i]
-    sound = np.abs(determinant) > ROUNDING * (np.abs(m[i] * k[j]) + np.abs(m[j] * k[i]))
+    sound = np.abs(determinant) > PROPORTIONAL_ROUNDING * (np.abs(m[i] * k[j]) + np.abs(m[j] * k[i]))
     if not sound.any():  # M and K are proportional: one of them says all
         return 0.0, float(np.median(c[stiff] / k[stiff]))
     i, j, determinant = i[sound], j[sound], determinant[sound]

@@ -18,11 +18,11 @@ from halfdof_ctrl.base.errors import ComplexModelError, MatrixError, ModelSizeEr
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 
-MASSLESS = 1e-13  #: of the largest mass per stiffness: motions below have none but rounding
-RIGID = 1e-8  #: of the highest frequency, squared relative to the shift: modes below float and are not damped
-SHARE = 1e-6  #: of the largest entry of a null vector: DOFs above are named
+MASSLESS_MOTION = 1e-13  #: of the largest mass per stiffness: motions below have none but rounding
+RIGID_MOTION = 1e-8  #: of the highest frequency, squared relative to the shift: modes below float and are not damped
 
 
 def with_modal_damping(model: SecondOrderModel, loss_factor: float | None = None) -> SecondOrderModel:
@@ -67,7 +67,7 @@ def with_modal_damping(model: SecondOrderModel, loss_factor: float | None = None
     shapes, omega = _modes(M, K, model.dofs)
     if loss_factor is None:
         lost = np.einsum("ir,ij,jr->r", shapes, np.asarray(model.K).imag, shapes)
-        if (lost < -MASSLESS * np.abs(lost).max(initial=0.0)).any():
+        if (lost < -MASSLESS_MOTION * np.abs(lost).max(initial=0.0)).any():
             worst = float(omega[int(np.argmin(lost))] / (2.0 * np.pi))
             msg = f"The imaginary part of K drives the mode at {worst:.4g} Hz instead of damping it. Look at its sign."
             raise ParameterError(msg, parameter="loss_factor", value=worst)
@@ -113,15 +113,15 @@ def _modes(M: FloatArray, K: FloatArray, dofs: tuple[str, ...]) -> tuple[FloatAr
     shifted = K + sigma * M
     scale = 1.0 / np.sqrt(np.where(np.diagonal(shifted) > 0.0, np.diagonal(shifted), 1.0))
     values, vectors = scipy.linalg.eigh(shifted * scale * scale[:, None])
-    if values[0] <= MASSLESS * values[-1]:
+    if values[0] <= MASSLESS_MOTION * values[-1]:
         part = np.abs(vectors[:, 0])
-        loose = tuple([dofs[i] for i in np.flatnonzero(part > SHARE * part.max()).tolist()])
+        loose = tuple([dofs[i] for i in np.flatnonzero(part > NULL_VECTOR_SHARE * part.max()).tolist()])
         msg = f"DOFs {listed(loose)} move together without mass and without stiffness. Give them one or remove them."
         raise SingularPencilError(msg, dofs=loose)
     scaled, both = M * scale * scale[:, None], shifted * scale * scale[:, None]
     slowness, turned = scipy.linalg.eigh((scaled + scaled.T) / 2.0, (both + both.T) / 2.0)
-    kept = slowness > MASSLESS * slowness.max(initial=0.0)
+    kept = slowness > MASSLESS_MOTION * slowness.max(initial=0.0)
     shapes = turned[:, kept] * scale[:, None] / np.sqrt(slowness[kept])
     squares = np.einsum("ir,ij,jr->r", shapes, K, shapes)
-    moving = squares > RIGID * sigma
+    moving = squares > RIGID_MOTION * sigma
     return np.asarray(shapes[:, moving]), np.asarray(np.sqrt(squares[moving]))

@@ -17,15 +17,16 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME
 from halfdof_ctrl.base.sparse_products import times
-from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.modal.slices import MOST, modes_by_slices
 
-FEW = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
+FEW_MASSES = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
 SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular ...
 SOFTER = (1e-12, 1e-10, 1e-8, 1e-6, 1e-3)  #: ... or is not told from singular with that one either
 UNSYMMETRIC = 1e-9  #: relative difference between a matrix and its transpose that is no rounding
-MASSLESS = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
+MASSLESS_DIRECTION = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -57,8 +58,8 @@ class ShiftedStiffness:
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``(K - sigma M)^-1 right`` for an (n, k) array; the matrix is symmetric."""
         solution = np.empty_like(right, order="F")
-        for start in range(0, right.shape[1], WIDTH):
-            span = slice(start, start + WIDTH)
+        for start in range(0, right.shape[1], COLUMNS_AT_A_TIME):
+            span = slice(start, start + COLUMNS_AT_A_TIME)
             part = np.array(right[:, span], order="F")
             solution[:, span] = self.factors.solve_transposed(part) * self.factors.rows[:, None]
         return solution
@@ -66,8 +67,8 @@ class ShiftedStiffness:
     def solve_sparse(self, right: SparseMatrix, what: str) -> FloatArray:
         """Return ``(K - sigma M)^-1 right`` for the columns of a sparse matrix."""
         solution = np.empty(right.shape, order="F")
-        for start in progress(range(0, right.shape[1], WIDTH), what):
-            span = slice(start, start + WIDTH)
+        for start in progress(range(0, right.shape[1], COLUMNS_AT_A_TIME), what):
+            span = slice(start, start + COLUMNS_AT_A_TIME)
             solution[:, span] = self.solve(right[:, span].toarray())
         return solution
 
@@ -110,7 +111,7 @@ def lowest_modes(stiffness: ShiftedStiffness, count: int) -> Modes:
     massive = np.flatnonzero(np.diff(stiffness.M.indptr))
     if massive.size == 0 or count == 0:
         return Modes(np.zeros(0), np.zeros((stiffness.K.shape[0], 0)))
-    if massive.size <= max(FEW, 3 * count):
+    if massive.size <= max(FEW_MASSES, 3 * count):
         return _all_modes(stiffness, massive, count)
     if count > MOST:
         return _sorted(*modes_by_slices(stiffness.K, stiffness.M, count))
@@ -128,11 +129,11 @@ def _all_modes(stiffness: ShiftedStiffness, massive: IndexArray, count: int) -> 
     """Find the modes from the flexibility at the DOFs with mass."""
     mass = stiffness.M[massive][:, massive].toarray()
     sizes, vectors = scipy.linalg.eigh((mass + mass.T) / 2.0)
-    kept = sizes > MASSLESS * sizes.max(initial=0.0)
+    kept = sizes > MASSLESS_DIRECTION * sizes.max(initial=0.0)
     root = vectors[:, kept] * np.sqrt(sizes[kept])  # mass = root root^T
     flexibility = np.empty((root.shape[1], root.shape[1]))
-    for start in progress(range(0, root.shape[1], WIDTH), "flexibilities"):
-        span = slice(start, start + WIDTH)
+    for start in progress(range(0, root.shape[1], COLUMNS_AT_A_TIME), "flexibilities"):
+        span = slice(start, start + COLUMNS_AT_A_TIME)
         flexibility[:, span] = root.T @ stiffness.solve(_spread(root[:, span], massive, stiffness))[massive]
     inverse, turn = scipy.linalg.eigh((flexibility + flexibility.T) / 2.0)
     first = np.argsort(-inverse)[:count]

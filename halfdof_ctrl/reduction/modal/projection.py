@@ -13,13 +13,13 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.modal.craig_bampton import Motions, Parts
 
-LOST = "K''"  #: the key of the imaginary part of a complex K among the matrices
-BLOCK = 32  #: motions that are multiplied at a time
-FAST = 1e-10  #: square of the band's upper end over a coordinate's own frequency up to which it needs no mass
-MASSLESS = 1e-13  #: of the scaled mass: combinations of coordinates below have none but rounding
-ROUNDING = 1e-12  #: of its terms: an entry below is rounding of a sum that cancels
-SPECK = 1e-8  #: of the largest entry of a combination without mass, in scaled coordinates: entries below are rounding
-FIRST = 1e3  #: weight by which kept DOFs are preferred as those that stay static
+IMAGINARY_STIFFNESS = "K''"  #: the key of the imaginary part of a complex K among the matrices
+MOTIONS_AT_A_TIME = 32  #: motions that are multiplied at a time
+FAST_COORDINATE = 1e-10  #: square of the band's upper end over a coordinate's frequency up to which it needs no mass
+MASSLESS_COMBINATION = 1e-13  #: of the scaled mass: combinations of coordinates below have none but rounding
+PROJECTION_ROUNDING = 1e-12  #: of its terms: an entry below is rounding of a sum that cancels
+COMBINATION_SPECK = 1e-8  #: of the largest entry of a combination without mass, scaled: entries below are rounding
+KEPT_PREFERRED = 1e3  #: weight by which kept DOFs are preferred as those that stay static
 
 
 def projected(
@@ -52,7 +52,7 @@ def projected(
     M[modal, modal], K[modal, modal] = np.eye(count), np.diag(motions.omega**2)
     signals: dict[str, Any] = {letter: np.asarray(parts[letter].T @ motions.shapes).T for letter in ("B", "Bv", "Ba")}
     signals |= {letter: times(parts[letter], motions.shapes) for letter in ("F", "G", "H")}
-    lost = _between(motions.shapes, parts[LOST]) if LOST in parts else None
+    lost = _between(motions.shapes, parts[IMAGINARY_STIFFNESS]) if IMAGINARY_STIFFNESS in parts else None
     M, turn = _massless_columns(M, K, omega, kept)
     if turn is not None:
         C, K = _cleaned(turn.T, C, turn), _cleaned(turn.T, K, turn)
@@ -76,8 +76,8 @@ def projected(
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
     """Return ``basis^T matrix basis``, some columns at a time."""
     product = np.empty((basis.shape[1], basis.shape[1]))
-    for start in range(0, basis.shape[1], BLOCK):
-        span = slice(start, start + BLOCK)
+    for start in range(0, basis.shape[1], MOTIONS_AT_A_TIME):
+        span = slice(start, start + MOTIONS_AT_A_TIME)
         product[:, span] = basis.T @ times(matrix, basis[:, span])
     return product
 
@@ -89,20 +89,20 @@ def _massless_columns(M: FloatArray, K: FloatArray, omega: float, kept: int) -> 
     but rounding, as many coordinates are made these combinations, ``p' = p`` for them; the mass of the others stays.
     """
     stiffness = np.abs(np.diagonal(K))
-    slow = omega**2 * np.diagonal(M) > FAST * stiffness
+    slow = omega**2 * np.diagonal(M) > FAST_COORDINATE * stiffness
     M = M * slow * slow[:, None]
     heavy = np.flatnonzero(slow)
     scale = np.sqrt(stiffness[heavy] + omega**2 * np.diagonal(M)[heavy]) / omega
     ratios, vectors = scipy.linalg.eigh(M[np.ix_(heavy, heavy)] / scale / scale[:, None])
-    null = vectors[:, ratios <= MASSLESS] / scale[:, None]
+    null = vectors[:, ratios <= MASSLESS_COMBINATION] / scale[:, None]
     if null.shape[1] == 0:
         return M, None
-    weights = np.where(heavy < kept, FIRST, 1.0) * scale
+    weights = np.where(heavy < kept, KEPT_PREFERRED, 1.0) * scale
     _, _, pivots = scipy.linalg.qr((null * weights[:, None]).T, pivoting=True, mode="economic")
     chosen = pivots[: null.shape[1]]
     combinations = np.linalg.solve(null[chosen].T, null.T).T
     size = np.abs(combinations) * scale[:, None]
-    combinations[size <= SPECK * size.max(axis=0)] = 0.0
+    combinations[size <= COMBINATION_SPECK * size.max(axis=0)] = 0.0
     combinations[chosen] = np.eye(chosen.size)
     turn = np.eye(M.shape[0])
     turn[np.ix_(heavy, heavy[chosen])] = combinations
@@ -115,7 +115,7 @@ def _cleaned(left: FloatArray, matrix: FloatArray, right: FloatArray) -> FloatAr
     """Multiply, and set entries to zero that are rounding of a sum whose terms cancel."""
     product = left @ matrix @ right
     size = np.abs(left) @ np.abs(matrix) @ np.abs(right)
-    return np.where(np.abs(product) <= ROUNDING * size, 0.0, product)
+    return np.where(np.abs(product) <= PROJECTION_ROUNDING * size, 0.0, product)
 
 
 def _names(dofs: tuple[str, ...], motions: Motions, turn: FloatArray | None) -> tuple[str, ...]:

@@ -19,18 +19,17 @@ import scipy.linalg
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import splu
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked: errors grow towards its end
-TOGETHER = 0.01  #: relative distance of poles that are improved together
+POLES_TOGETHER = 0.01  #: relative distance of poles that are improved together
 LARGEST_GROUP = 12  #: poles that are improved together at most
-ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
-UNDAMPED = 1e-6  #: of its size: the real part of a pole that counts as undamped here
-SILENT = 1e-3  #: of the largest residue over its pole's size: resonances that show less in a channel are no part of it
+POLE_ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
+UNDAMPED_POLE = 1e-6  #: of its size: the real part of a pole that counts as undamped here
+SILENT_RESONANCE = 1e-3  #: of a channel's largest residue over its pole's size: resonances below are no part of it
 OVERDAMPED = 0.7  #: damping ratio of what is no resonance
-UNIT = float(np.finfo(float).eps) / 2.0
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,7 +77,7 @@ def resonance_errors(
         w = shapes[:, k]
         stiff: Any = parts["K"] @ w
         energy = abs(complex(w @ stiff))
-        floor.append(0.5 * UNIT * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
+        floor.append(0.5 * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
     return ResonanceErrors(
         frequencies=np.abs(poles) / (2.0 * np.pi),
         frequency_shift=np.abs(np.abs(found) - np.abs(poles)) / np.abs(found),
@@ -112,7 +111,7 @@ def _groups(poles: ComplexArray) -> list[list[int]]:
     """Put poles that are close side by side into groups."""
     groups: list[list[int]] = []
     for k in range(poles.size):
-        near = groups and abs(poles[k] - poles[groups[-1][-1]]) <= TOGETHER * abs(poles[k])
+        near = groups and abs(poles[k] - poles[groups[-1][-1]]) <= POLES_TOGETHER * abs(poles[k])
         if near and len(groups[-1]) < LARGEST_GROUP:
             groups[-1].append(k)
         else:
@@ -126,8 +125,8 @@ def _improved(
     """Return the full model's poles nearest to some of the small one's, and their vectors."""
     K, C, M = (parts[letter] for letter in "KCM")
     s = complex(poles.mean())
-    if abs(s.real) < UNDAMPED * abs(s):
-        s *= 1.0 + ASIDE * 1j
+    if abs(s.real) < UNDAMPED_POLE * abs(s):
+        s *= 1.0 + POLE_ASIDE * 1j
     factors = splu(csc_array(K + s * C + s**2 * M))
     right = C @ shapes + 2.0 * (M @ shapes) * poles
     w = factors.solve(np.asfortranarray(right, dtype=np.complex128))
@@ -164,7 +163,7 @@ def _height_errors(
     dense: dict[str, Any] = {letter: np.asarray(getattr(small, letter)) for letter in (*parts,)}
     first, second = (_residues(matrices, *each) for matrices, each in ((dense, reduced), (parts, full)))
     weight = np.abs(second) / np.abs(full[0])[:, None, None]
-    shown = weight > SILENT * weight.max(axis=0, keepdims=True)
+    shown = weight > SILENT_RESONANCE * weight.max(axis=0, keepdims=True)
     with np.errstate(divide="ignore", invalid="ignore"):
         change = np.where(shown, np.abs(first - second) / np.abs(second), 0.0)
     return np.asarray(np.nan_to_num(change).max(axis=(1, 2)))

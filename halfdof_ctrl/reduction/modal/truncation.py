@@ -34,17 +34,17 @@ from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
-from halfdof_ctrl.reduction.modal.craig_bampton import MARGIN, Motions, Parts, craig_bampton
+from halfdof_ctrl.reduction.modal.craig_bampton import KEPT_MODES_MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
-from halfdof_ctrl.reduction.modal.projection import LOST, projected
+from halfdof_ctrl.reduction.modal.projection import IMAGINARY_STIFFNESS, projected
 from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resonance_errors
 
-POINTS = 12  #: frequencies between resonances at which the error is measured
-DOUBTFUL = 4  #: frequencies where most is expected of it, at which it is measured too
+MEASURED_POINTS = 12  #: frequencies between resonances at which the error is measured
+DOUBTFUL_POINTS = 4  #: frequencies where most is expected of it, at which it is measured too
 CANDIDATES = 200  #: frequencies among which these are looked for
-EFFORT = 4e10  #: cubes of the small model's size that this may take
+MEASURING_EFFORT = 4e10  #: cubes of the small model's size that this may take
 DECADES = 2.0  #: of the band below its upper end
-ALLOWED = 0.05  #: error relative to a channel's largest value, or of a resonance's height, that is warned of
+ALLOWED_ERROR = 0.05  #: error relative to a channel's largest value, or of a resonance's height, that is warned of
 ALLOWED_SHIFT = 0.01  #: relative shift of a resonance that is warned of
 BANDWIDTHS = 5.0  #: half-power bandwidths that frequencies between resonances keep from them
 SHARPEST = 5e-4  #: half-power bandwidth of an undamped resonance, in 2 pi of its frequency
@@ -93,7 +93,7 @@ class TruncatedModel(SecondOrderModel):
 
 @limited_threads(1)
 def truncate_modes(
-    model: SecondOrderModel, *, f_max: float | None = None, n_modes: int | None = None, points: int = POINTS
+    model: SecondOrderModel, *, f_max: float | None = None, n_modes: int | None = None, points: int = MEASURED_POINTS
 ) -> TruncatedModel:
     """Make a small model of the modes that matter, and measure its error.
 
@@ -161,7 +161,7 @@ def truncate_modes(
     whole = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
     parts = dict(whole)
     if model.is_complex:  # modes are those of the real part; both are projected on them
-        parts |= {"K": csc_array(parts["K"].real), LOST: csc_array(parts["K"].imag)}
+        parts |= {"K": csc_array(parts["K"].real), IMAGINARY_STIFFNESS: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
@@ -209,7 +209,7 @@ def _band_top(parts: Parts, omega: FloatArray, f_max: float | None) -> float:
     if f_max is not None:
         return f_max
     if omega.size and omega[-1] > 0.0:
-        return float(omega[-1] / (2.0 * np.pi * MARGIN))
+        return float(omega[-1] / (2.0 * np.pi * KEPT_MODES_MARGIN))
     stiffness, mass = np.abs(parts["K"].diagonal()), np.abs(parts["M"].diagonal())
     speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
     return float(np.sqrt(speeds.max(initial=0.0) or 1.0) / (2.0 * np.pi))
@@ -248,7 +248,7 @@ def _measured(
         resonances=resonances,
     )
     shift, height = truncated.max_shift, float(resonances.height.max(initial=0.0))
-    if truncated.max_error > ALLOWED or shift > ALLOWED_SHIFT or height > ALLOWED:
+    if truncated.max_error > ALLOWED_ERROR or shift > ALLOWED_SHIFT or height > ALLOWED_ERROR:
         said = " ".join(_error_in_words(truncated).split())
         msg = f"The small model is not close to the full one: {said}. Raise f_max or n_modes."
         warnings.warn(msg, TruncationWarning, stacklevel=callers_level())
@@ -303,9 +303,9 @@ def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
 
 def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
     """Return frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
-    count = min(CANDIDATES, int(EFFORT / len(small.dofs) ** 3))
+    count = min(CANDIDATES, int(MEASURING_EFFORT / len(small.dofs) ** 3))
     above = motions.kept.size + np.flatnonzero(motions.omega > 2.0 * np.pi * top)
-    if count < DOUBTFUL or above.size == 0:
+    if count < DOUBTFUL_POINTS or above.size == 0:
         return np.zeros(0)
     rest = np.setdiff1d(np.arange(len(small.dofs)), above)
     parts: dict[str, Any] = {letter: getattr(small, letter)[np.ix_(rest, rest)] for letter in "MCK"}
@@ -319,4 +319,4 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
     difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
     expected = _relative(difference, size).max(axis=(0, 1))
     peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
-    return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL]]])
+    return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL_POINTS]]])

@@ -13,19 +13,20 @@ from itertools import zip_longest
 import numpy as np
 from scipy.sparse import csc_array, csr_array, hstack
 
-from halfdof_ctrl.base.arrays import FloatArray, Matrix
+from halfdof_ctrl.base.arrays import EPS, FloatArray, Matrix
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix, as_sparse, joined_sparse, sparse_unit
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME
 from halfdof_ctrl.base.sparse_products import Transposed, times
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.sparse_lu import WIDTH, SparseLU, largest_of_columns
+from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU, largest_of_columns
 from halfdof_ctrl.reduction.method.signals import Signal, absorbed, trimmed
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition
 
-MOST_ENTRIES = 2**26  #: of A, B, C or D of a state space, and of equation (4) for all DOFs, dense (512 MB)
-ROUNDING = 32 * float(np.finfo(float).eps)  #: times n, at most 64: a coefficient of u' below this part is rounding
+MOST_SYSTEM_ENTRIES = 2**26  #: of A, B, C or D of a state space, and of equation (4) for all DOFs, dense (512 MB)
+SHIFT_ROUNDING = 32 * EPS  #: times n, at most 64: a coefficient of u' below this part is rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -47,7 +48,7 @@ class SparseEquation:
         inertial, half = partition.of_kind(INERTIAL), partition.of_kind(HALF)
         columns = [partition.mapped(matrix, own) for matrix, own in ((K, inertial), (K, half), (C, inertial))]
         states = csc_array(hstack(columns, format="csc"))
-        forces = [as_sparse(matrix) for matrix in (model.B, model.Bv, model.Ba)]
+        forces = [as_sparse(matrix) for matrix in model.quadratics.B]
         while len(forces) > 1 and forces[-1].nnz == 0:
             forces.pop()
         scaled = [
@@ -66,18 +67,18 @@ def require_room(rows: int, columns: int, what: str, remedy: str) -> None:
     ModelSizeError
         More than 2^26 entries.
     """
-    if rows * columns > MOST_ENTRIES:
+    if rows * columns > MOST_SYSTEM_ENTRIES:
         msg = (
             f"{what} would be a dense matrix of {rows} x {columns} and take {8e-9 * rows * columns:.3g} GB; the limit "
-            f"is {8e-9 * MOST_ENTRIES:.2g} GB. {remedy}"
+            f"is {8e-9 * MOST_SYSTEM_ENTRIES:.2g} GB. {remedy}"
         )
-        raise ModelSizeError(msg, size=max(rows, columns), limit=MOST_ENTRIES // min(rows, columns))
+        raise ModelSizeError(msg, size=max(rows, columns), limit=MOST_SYSTEM_ENTRIES // min(rows, columns))
 
 
 def inverse_rows(leading: SparseLU, places: IndexArray) -> Iterator[tuple[IndexArray, FloatArray]]:
     """Solve ``W^T z = e`` for unit vectors e, in blocks: give which of the places, and z in the scaled equations."""
-    for start in range(0, places.size, WIDTH):
-        block = np.arange(start, min(start + WIDTH, places.size))
+    for start in range(0, places.size, COLUMNS_AT_A_TIME):
+        block = np.arange(start, min(start + COLUMNS_AT_A_TIME, places.size))
         right = np.zeros((leading.rows.size, block.size), order="F")
         right[places[block], np.arange(block.size)] = 1.0
         yield block, leading.solve_transposed(right)
@@ -169,9 +170,9 @@ class SparseDisplacement:
         remedy = "Select the outputs and inputs that matter: model.select(inputs=[...], outputs=[...])."
         require_room(p, max(m, 1), "D", remedy)
         require_room(p, max(N, 1), "C", remedy)
-        parts = [model.F, model.G, model.H]
+        parts = model.quadratics.F
         signal, size = self._combined(as_sparse(joined_sparse([[part] for part in parts])))
-        direct = trimmed(tuple([as_sparse(matrix).toarray() for matrix in (model.D, model.Dv, model.Da)]))
+        direct = trimmed(tuple([as_sparse(matrix).toarray() for matrix in model.quadratics.D]))
         total, bound = Signal(np.zeros((p, N)), direct), Signal(np.zeros((p, N)), ())
         A, B = np.abs(self.A), self._input_sizes()[0]
         for order, part in enumerate(parts):
@@ -181,7 +182,7 @@ class SparseDisplacement:
             for _ in range(order):
                 motion, motion_size = motion.derivative(self.A, self.B), motion_size.derivative(A, B)
             total, bound = total.plus(motion), bound.plus(motion_size)
-        rounding = ROUNDING * min(self.leading.rows.size, 64)
+        rounding = SHIFT_ROUNDING * min(self.leading.rows.size, 64)
         none = np.zeros((p, m))
         kept = [
             np.where(np.abs(part) <= rounding * scale, 0.0, part)
@@ -200,8 +201,8 @@ class SparseDisplacement:
         q = np.empty((n, x.shape[1]))
         static = part.of_kind(STATIC)
         with progress_bar(x.shape[1], "times") as advance:
-            for start in range(0, x.shape[1], WIDTH):
-                span = slice(start, start + WIDTH)
+            for start in range(0, x.shape[1], COLUMNS_AT_A_TIME):
+                span = slice(start, start + COLUMNS_AT_A_TIME)
                 right = -times(self.equation.states, physical[:, span])
                 for force, u in zip(forces, inputs, strict=False):
                     right += times(force, u[:, span])
@@ -258,8 +259,8 @@ class SparseDisplacement:
         if static.shape[0] <= needed:
             scales = [abs(part).sum(axis=0) for part in columns]
             with progress_bar(static.shape[0], "solutions for outputs") as advance:
-                for start in range(0, static.shape[0], WIDTH):
-                    span = slice(start, start + WIDTH)
+                for start in range(0, static.shape[0], COLUMNS_AT_A_TIME):
+                    span = slice(start, start + COLUMNS_AT_A_TIME)
                     z = leading.solve_transposed(static[span].T.toarray(order="F"))
                     largest = largest_of_columns(z)
                     for turned, product, size, scale in zip(equation.transposes, products, sizes, scales, strict=True):
@@ -270,8 +271,8 @@ class SparseDisplacement:
             with progress_bar(needed, "solutions for states and inputs") as advance:
                 for part, product, size in zip(columns, products, sizes, strict=True):
                     filled = np.flatnonzero(np.diff(part.indptr))
-                    for start in range(0, filled.size, WIDTH):
-                        which = filled[start : start + WIDTH]
+                    for start in range(0, filled.size, COLUMNS_AT_A_TIME):
+                        which = filled[start : start + COLUMNS_AT_A_TIME]
                         solution = leading.solve(part[:, which].toarray(order="F"))
                         product[:, which], size[:, which] = static @ solution, weight * leading.column_sizes(solution)
                         advance(which.size)

@@ -14,6 +14,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.algebra.leading_matrix import plainly_regular
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
@@ -26,8 +27,7 @@ from halfdof_ctrl.reduction.sparse.partition import SparsePartition
 from halfdof_ctrl.reduction.sparse.selection import has_dependent_columns, select_sparse_columns
 from halfdof_ctrl.reduction.sparse.single_solve import require_states, solved_by_rows, sparse_leading_columns
 
-NULL_VECTOR_SHARE = 1e-6  #: DOFs with more than this share of a null vector are named
-SMALL = 500  #: DOFs up to which a sparse model is reduced densely where a decision is near
+DENSE_COPY_DOFS = 500  #: DOFs up to which a sparse model is reduced densely where a decision is near
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -144,7 +144,7 @@ def by_sparse_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) 
     ModelSizeError
         A or B would be too large, or M or C connects too many coordinates.
     """
-    if not asked and len(model.dofs) <= SMALL:
+    if not asked and len(model.dofs) <= DENSE_COPY_DOFS:
         return None
     coordinates = sparse_bases(model, tol)
     require_states(model, coordinates)
@@ -159,7 +159,7 @@ def _solved(model: SecondOrderModel, coordinates: SparsePartition, *, asked: boo
         if asked:
             raise _singular_error(model, coordinates, leading)
         return None
-    if not asked and n <= SMALL and leading.rcond < plainly_regular(n):
+    if not asked and n <= DENSE_COPY_DOFS and leading.rcond < plainly_regular(n):
         return None
     displacement = solved_by_rows(model, coordinates, leading)
     found = SparseSolve(model=model, coordinates=coordinates, leading=leading, displacement=displacement)

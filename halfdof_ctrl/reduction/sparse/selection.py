@@ -8,13 +8,11 @@ from halfdof_ctrl.base.sparse_arrays import as_sparse, largest_by_row_and_column
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import split_block
-from halfdof_ctrl.reduction.algebra.scaling import evening_logs
-from halfdof_ctrl.reduction.algebra.sparse_lu import scaled_matrix, sparse_levelling_factors
+from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, unit_free_scaling
 from halfdof_ctrl.reduction.method.evidence import LightMasses
 from halfdof_ctrl.reduction.method.masses import slowest_speed, spread_is_wide
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, STATIC, SparsePartition, linked_columns
 
-SETTLED = 1e-8  #: accuracy of the scaling in which masses are compared, squared residual over the first one
 LARGEST_GLANCE = 100  #: the same before W is factorized
 
 
@@ -59,7 +57,5 @@ def _mass_ratios(model: SecondOrderModel) -> FloatArray:
     M, C, K = (abs(as_sparse(matrix)) for matrix in (model.M, model.C, model.K))
     gamma = slowest_speed(model)
     total = csc_array(K + gamma * C + gamma**2 * M)
-    rows, columns = [np.exp2(logs) for logs in evening_logs(total, settled=SETTLED)]
-    down, across = sparse_levelling_factors(scaled_matrix(total, rows, columns))
-    _, mass = largest_by_row_and_column(scaled_matrix(csc_array(M), down * rows, across * columns))
+    _, mass = largest_by_row_and_column(unit_free_scaling(total, ROUGHLY_SETTLED).of_sparse(csc_array(M)))
     return np.asarray(mass / mass.max() if mass.max() > 0.0 else mass)

@@ -46,7 +46,7 @@ def test_singular_values_are_those_of_the_matrix_that_was_factorized(seed: int, 
     """Of W, or of the scaled one."""
     W = badly_scaled(seed, spread)
     leading = LeadingMatrix.factorized(W)
-    matrix = W if leading.equilibrated is None else leading.equilibrated
+    matrix = W if leading.scaled is None else leading.scaled
     assert_allclose(leading.singular_values(), np.linalg.svd(matrix, compute_uv=False), rtol=0.0, atol=ROUNDOFF * 100)
 
 
@@ -104,7 +104,7 @@ def test_model_with_even_maxima_keeps_its_method() -> None:
 def test_scaling_reaches_the_least_condition_number(seed: int, spread: int) -> None:
     """Bauer's theorem: the least one over all scalings is the spectral radius of ``|W^-1| |W|``, in any units."""
     leading = LeadingMatrix.factorized(badly_scaled(seed, spread))
-    plain = badly_scaled(seed, spread) if leading.equilibrated is None else leading.equilibrated
+    plain = badly_scaled(seed, spread) if leading.scaled is None else leading.scaled
     least = np.abs(np.linalg.eigvals(np.abs(np.linalg.inv(plain)) @ np.abs(plain))).max()
     assert leading.rcond <= 3.0 / least  # the norm of the inverse is estimated, from below
     enough = leading.rcond >= PLAINLY_REGULAR_IF_SMALL

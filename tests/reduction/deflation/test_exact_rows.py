@@ -125,6 +125,6 @@ def test_long_denominators_are_rounded_without_harm(seed: int, size: int) -> Non
     realization = realized(result.system, result.offsets, USUAL)
     whole = solved_without_rounding(realization, result.system).equations
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(exact_solution, "LONGEST", 1)
+        patch.setattr(exact_solution, "LONGEST_DENOMINATOR", 1)
         cut = solved_without_rounding(realization, result.system).equations
     assert_allclose(cut.A, whole.A, rtol=1e-14, atol=1e-30)

@@ -20,7 +20,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 def coefficients(model: SecondOrderModel) -> npt.NDArray[np.float64]:
     """Give K, C, M."""
-    return np.stack([model.K, model.C, model.M])
+    return np.stack(model.quadratics.P)
 
 
 def drawn(seed: int, size: int, powers: int = 3) -> BoolArray:

@@ -8,9 +8,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, hydromount
+from halfdof_ctrl.reduction.algebra.blocks import RANK_TOLERANCE
 from halfdof_ctrl.reduction.deflation.offsets import structural_offsets
-from halfdof_ctrl.reduction.deflation.relaxation import RANK_TOLERANCE, UNCLEAR, Relaxed, independent_rows, relaxed
-from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, levelled, unit_free
+from halfdof_ctrl.reduction.deflation.relaxation import UNCLEAR_TIGHT_RANK, Relaxed, independent_rows, relaxed
+from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem, level_scaled, unit_free
 from halfdof_ctrl.reduction.method.units import Units, scaled_rows
 from support import exact
 from support.mechanisms import blade, derivatives, hanging_chain, rod
@@ -23,7 +24,7 @@ DETERMINANT = 1e-9  # of integer matrices up to 5 x 5 after a few row operations
 
 def relaxed_model(model: SecondOrderModel) -> tuple[RowSystem, Relaxed]:
     """Relax a model's equations."""
-    system = system_of(np.stack([model.K, model.C, model.M]))
+    system = system_of(np.stack(model.quadratics.P))
     return system, relaxed(system, USUAL)
 
 
@@ -133,7 +134,7 @@ def test_singular_values_in_doubt_are_parted_at_the_widest_gap() -> None:
     for doubtful, rank in ((2 * rounding, 2), (15 * rounding, 4)):
         M = rotation @ np.diag([1.0, 0.1, doubtful, 0.75 * doubtful]) @ rotation.T
         decision = relaxed(system_of([np.eye(4), np.zeros((4, 4)), M]), Caution(24.0, 0.0)).decisions[0]
-        assert decision.singular_values[2] < UNCLEAR * rounding * decision.singular_values[0]
+        assert decision.singular_values[2] < UNCLEAR_TIGHT_RANK * rounding * decision.singular_values[0]
         assert decision.rank == rank
 
 
@@ -162,7 +163,7 @@ def test_decisions_are_the_same_in_any_units(seed: int, size: int, powers: list[
 
 @given(seed=SEEDS, size=st.integers(1, 4), powers=POWERS)
 def test_unit_free_scaling_is_the_same_in_any_units(seed: int, size: int, powers: list[int]) -> None:
-    """What rows, columns and time still lack makes J the same, levelled or not."""
+    """What rows, columns and time still lack makes J the same, level or not."""
     P = drawn(seed, size)
     columns, rows = 10.0 ** np.array(powers[:size]), 10.0 ** np.array(powers[4 : 4 + size])
     speed = (10.0 ** powers[8]) ** np.arange(3.0)
@@ -171,7 +172,7 @@ def test_unit_free_scaling_is_the_same_in_any_units(seed: int, size: int, powers
     assume(found is not None)
     assert found is not None
     systems = system_of(P), system_of(P * columns * rows[:, None] * speed[:, None, None])
-    for scaling in (unit_free, levelled):
+    for scaling in (unit_free, level_scaled):
         one, other = (scaling(part, found, found.tight(part.matrix), every, every) for part in systems)
         assert_allclose(other.matrix, one.matrix, rtol=DETERMINANT)
         assert_allclose(one.matrix, found.tight(systems[0].matrix) * one.rows[:, None] * one.columns, rtol=ROUNDOFF)

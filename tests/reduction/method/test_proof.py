@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
-from halfdof_ctrl.reduction.method.proof import AXIS, Losses, ScaledPencil, has_spectrum
+from halfdof_ctrl.reduction.method.proof import AXIS_POINTS, Losses, ScaledPencil, has_spectrum
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 from halfdof_ctrl.reduction.method.units import scaled_rows
 from support import exact
@@ -23,9 +23,7 @@ MEASURED = 0.5  # a loss is a figure of one digit
 
 def pencil_of(model: SecondOrderModel) -> ScaledPencil:
     """Scale a model's quadratics; outputs are all scaled displacements."""
-    rows, _ = scaled_rows(
-        np.stack([model.K, model.C, model.M]).astype(float), np.stack([model.B, model.Bv, model.Ba]).astype(float)
-    )
+    rows, _ = scaled_rows(np.stack(model.quadratics.P).astype(float), np.stack(model.quadratics.B).astype(float))
     n, m = len(model.dofs), model.B.shape[1]
     F = np.concatenate([np.eye(n)[None], np.zeros((2, n, n))])
     return ScaledPencil(P=rows.coefficients[:, :, :n], B=rows.coefficients[:, :, n:], F=F, D=np.zeros((3, n, m)))
@@ -126,7 +124,7 @@ def test_difference_that_a_direct_solve_may_make_is_no_loss() -> None:
 
 def test_point_at_an_eigenvalue_is_left_out() -> None:
     """An undamped mass that is in resonance at one of the points is measured at the others."""
-    stiffness = -((AXIS[1] ** np.arange(3))[2]).real
+    stiffness = -((AXIS_POINTS[1] ** np.arange(3))[2]).real
     P = np.array([[[stiffness]], [[0.0]], [[1.0]]])
     pencil = ScaledPencil(P=P, B=np.array([[[1.0]], [[0.0]], [[0.0]]]), F=P * 0 + [[[1]], [[0]], [[0]]], D=P * 0.0)
     A = np.array([[0.0, 1.0], [-stiffness, 0.0]])
@@ -143,7 +141,7 @@ def test_expected_loss_is_that_of_the_last_digits() -> None:
     pencil = pencil_of(mechss([[0]], [[1]], [[1]]))
     equations = equations_of(mechss([[0]], [[1]], [[1]]))
     found = pencil.expected_loss(equations)
-    s = AXIS[0]
+    s = AXIS_POINTS[0]
     desired = np.finfo(float).eps * (abs(1 / (1 + s)) + 1.0)
     assert_allclose(found, desired, rtol=1e-12)
 

@@ -38,7 +38,7 @@ def test_modes_are_those_of_the_dense_solver(
     structure: Structure, share: float, few: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """By Lanczos and from the flexibility, with mass everywhere or at some DOFs, multiple modes included."""
-    monkeypatch.setattr(modes, "FEW", few)
+    monkeypatch.setattr(modes, "FEW_MASSES", few)
     K, M = structure.K, with_mass(structure, share)
     stiffness = ShiftedStiffness.factorized(K, M)
     assert stiffness is not None
@@ -53,7 +53,7 @@ def test_modes_are_those_of_the_dense_solver(
 @pytest.mark.parametrize("few", [0, 10_000])
 def test_a_free_structure_has_rigid_modes(few: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """A net without ground: K is singular, the first frequency is zero to rounding, the others are right."""
-    monkeypatch.setattr(modes, "FEW", few)
+    monkeypatch.setattr(modes, "FEW_MASSES", few)
     K = spring_grid(9, 8, 0).K
     K = csc_array(K - diags_array(np.asarray(K.sum(axis=1))))
     M = csc_array(diags_array(np.linspace(1.0, 2.0, 72)))
@@ -101,7 +101,7 @@ def test_lanczos_that_does_not_converge_is_refused(monkeypatch: pytest.MonkeyPat
     def fails(*_: object, **__: object) -> None:
         raise ArpackError(-9999)
 
-    monkeypatch.setattr(modes, "FEW", 0)
+    monkeypatch.setattr(modes, "FEW_MASSES", 0)
     monkeypatch.setattr(modes, "eigsh", fails)
     monkeypatch.setattr(slices, "eigsh", fails)
     structure = spring_grid(9, 9, 0)

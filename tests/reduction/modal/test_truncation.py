@@ -210,7 +210,7 @@ def test_repr_shows_size_and_error() -> None:
     assert f"error between them from 0.1 to 10 Hz, at {small.checked.size} frequencies: {small.max_error:.1e}" in text
     assert f"{small.resonances.frequencies.size} resonances from" in text
     assert "worst: q" in text
-    assert 5 <= small.checked.size <= 5 + truncation.DOUBTFUL
+    assert 5 <= small.checked.size <= 5 + truncation.DOUBTFUL_POINTS
 
 
 def test_an_error_that_is_large_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -88,7 +88,7 @@ def test_sparse_methods_alone_give_the_order_of_the_dense_ones(case: tuple[Struc
     assume(isinstance(dense, ExactReduction) and dense.method != "deflation")
     assert isinstance(dense, ExactReduction)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(method, "SMALL", 0)
+        patch.setattr(method, "DENSE_COPY_DOFS", 0)
         sparse, _ = told(mechss(*[csc_array(matrix) for matrix in matrices]))
     assert isinstance(sparse, ExactReduction)
     assert sparse.states == dense.states

@@ -271,7 +271,7 @@ def test_too_many_states_are_refused_with_count_memory_and_a_way_on() -> None:
 
 def test_too_many_inputs_and_outputs_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """They are to be selected by name."""
-    monkeypatch.setattr(displacement, "MOST_ENTRIES", 40)
+    monkeypatch.setattr(displacement, "MOST_SYSTEM_ENTRIES", 40)
     structure = spring_grid(5, 5, 2)
     with pytest.raises(ModelSizeError, match="B would be a dense matrix of 4 x 25"):
         exact_reduction(structure.model(), method="selection")
