@@ -14,7 +14,9 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning, own_messages, recording_warnings
+from halfdof_ctrl.base.command_start import PROGRAM
+from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
+from halfdof_ctrl.base.names import printable
 from halfdof_ctrl.commands import (
     BUILT_IN,
     REFUSED,
@@ -32,20 +34,20 @@ from halfdof_ctrl.commands import (
 from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
 from halfdof_ctrl.systems.state_map import KINDS
+from halfdof_ctrl.terminal import TerminatedError, asked_output_only, orderly_end
 
-PROGRAM = "halfdof-ctrl"
-INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
+INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143  #: as shells report the signals SIGINT, SIGPIPE and SIGTERM
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command with its arguments, by default those of the process, and give its exit code."""
-    arguments = _parser().parse_args(argv)
-    command: Callable[[argparse.Namespace], int] = arguments.command
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show is no reason to stop
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _warnings_on_stderr() as caught:
+        with orderly_end(), asked_output_only(), _warnings_on_stderr() as caught:
+            arguments = _parser().parse_args(argv)
+            command: Callable[[argparse.Namespace], int] = arguments.command
             without_windows()
             code = command(arguments)
             sys.stdout.flush()
@@ -56,6 +58,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except KeyboardInterrupt:
         return INTERRUPTED
+    except TerminatedError:
+        return TERMINATED
     except HalfdofError as refusal:
         _say("error", str(refusal))
         return REFUSED
@@ -68,7 +72,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
     """Show each of the package's warnings once, as a line."""
-    with recording_warnings() as caught:
+    with warnings.catch_warnings(record=True) as caught:  # the process is the command's own
+        warnings.filterwarnings("always", category=HalfdofWarning)
         try:
             yield caught
         finally:
@@ -77,7 +82,8 @@ def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
 
 
 def _say(kind: str, text: str) -> None:
-    print(f"{PROGRAM}: {kind}: {' '.join(text.split())}", file=sys.stderr)
+    if sys.stderr is not None:
+        print(f"{PROGRAM}: {kind}: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:

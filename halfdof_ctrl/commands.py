@@ -5,14 +5,20 @@ import functools
 import inspect
 import math
 import os
-import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TypeAlias, TypedDict, overload
 
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, LostStateWarning, ParameterError
+from halfdof_ctrl.base.errors import (
+    FileFormatError,
+    HalfdofError,
+    LostStateWarning,
+    ParameterError,
+    give_warning,
+    recording_warnings,
+)
 from halfdof_ctrl.base.names import listed, motions
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -208,9 +214,11 @@ def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: 
     if len(model.inputs) != 1:
         msg = f"A nonlinear model takes a step of one input; choose it by --inputs: {listed(model.inputs)}."
         raise ParameterError(msg, parameter="--inputs", value=model.inputs)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", LostStateWarning)  # of the tangent that only says how long to look
+    with recording_warnings() as caught:
         system = mech2ss(model.tangent())
+    for message, category in caught:
+        if category is not LostStateWarning:  # of the tangent that only says how long to look
+            give_warning(message, category)
     times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
     save_response(nonlinear_response(model, times, arguments.amplitude), arguments.o)
     return DONE

@@ -5,7 +5,6 @@ what another function makes of the model. Any `concurrent.futures.Executor` can 
 fails leaves NaN in the arrays and a named failure.
 """
 
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, callers_level
+from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.threads import available_cores
@@ -140,7 +139,7 @@ def sweep(
     result = plan.join(outcomes)
     if result.failures:
         msg = f"{len(result.failures)} of {len(outcomes)} {plan.what} failed, first {result.failures[0]}"
-        warnings.warn(msg, FailedCasesWarning, stacklevel=callers_level())
+        give_warning(msg, FailedCasesWarning)
     return result
 
 
