@@ -46,8 +46,8 @@ def asked_output_only() -> Iterator[None]:
         sys.stdout = _Closed()
         yield
         return
-    before = sys.stdout
-    if before is not sys.__stdout__ or not _is_descriptor(before, STDOUT):  # who calls has a stream of his own
+    before = sys.__stdout__
+    if before is None or sys.stdout is not before or not _is_descriptor(before, STDOUT):  # the caller's own stream
         yield
         return
     before.flush()
