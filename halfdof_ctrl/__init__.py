@@ -1,5 +1,8 @@
 """Exact state space of mechanical models with singular mass, for python-control."""
 
+from halfdof_ctrl.base import command_start as command_start  # before what takes time to import
+
+# isort: split
 from halfdof_ctrl import laws as laws  # `hd.laws`, a module and so no public name of its own
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros

@@ -7,6 +7,7 @@ nothing written).
 import argparse
 import functools
 import importlib.metadata
+import inspect
 import io
 import os
 import sys
@@ -14,9 +15,12 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
-from halfdof_ctrl.base.errors import HalfdofError, InterruptedResponseWarning, own_messages, recording_warnings
+from halfdof_ctrl.base.command_start import PROGRAM
+from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
+from halfdof_ctrl.base.names import printable
 from halfdof_ctrl.commands import (
     BUILT_IN,
+    DONE,
     REFUSED,
     WEIGHTS,
     run_bode,
@@ -28,24 +32,37 @@ from halfdof_ctrl.commands import (
     run_ss,
     run_step,
     run_stiffness,
+    run_transmissibility,
 )
 from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
 from halfdof_ctrl.systems.state_map import KINDS
+from halfdof_ctrl.terminal import TerminatedError, asked_output_only, orderly_end
 
-PROGRAM = "halfdof-ctrl"
-INTERRUPTED, BROKEN_PIPE = 130, 141  #: as shells report the signals SIGINT and SIGPIPE
+EXAMPLES = {
+    "report": "hydromount -o report",
+    "info": "hydromount -p C_h=450",
+    "ss": "hydromount -o mount.mat",
+    "bode": "hydromount --f-min 0.1 --f-max 20 --hz -o bode.png",
+    "step": "hydromount --time 5 -o step.csv",
+    "poles": "hydromount -o poles.svg",
+    "stiffness": "hydromount --f-max 30 -o stiffness.png",
+    "transmissibility": "hydromount --from y --to y2 -o transmissibility.png",
+    "lqr": "hydromount --displacement y=1e6 --effort F_y=1e-4",
+    "check": "hydromount -o check.json",
+}
+INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143  #: as shells report the signals SIGINT, SIGPIPE and SIGTERM
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command with its arguments, by default those of the process, and give its exit code."""
-    arguments = _parser().parse_args(argv)
-    command: Callable[[argparse.Namespace], int] = arguments.command
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show is no reason to stop
             stream.reconfigure(errors="backslashreplace")
     try:
-        with _warnings_on_stderr() as caught:
+        with orderly_end(), asked_output_only(), _warnings_on_stderr() as caught:
+            arguments = _parser().parse_args(argv)
+            command: Callable[[argparse.Namespace], int] = arguments.command
             without_windows()
             code = command(arguments)
             sys.stdout.flush()
@@ -56,6 +73,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return BROKEN_PIPE
     except KeyboardInterrupt:
         return INTERRUPTED
+    except TerminatedError:
+        return TERMINATED
     except HalfdofError as refusal:
         _say("error", str(refusal))
         return REFUSED
@@ -68,7 +87,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 @contextmanager
 def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
     """Show each of the package's warnings once, as a line."""
-    with recording_warnings() as caught:
+    with warnings.catch_warnings(record=True) as caught:  # the process is the command's own
+        warnings.filterwarnings("always", category=HalfdofWarning)
         try:
             yield caught
         finally:
@@ -77,7 +97,8 @@ def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
 
 
 def _say(kind: str, text: str) -> None:
-    print(f"{PROGRAM}: {kind}: {' '.join(text.split())}", file=sys.stderr)
+    if sys.stderr is not None:
+        print(f"{PROGRAM}: {kind}: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -89,7 +110,8 @@ def _parser() -> argparse.ArgumentParser:
     )
     version = importlib.metadata.version("halfdof_ctrl")
     parser.add_argument("--version", action="version", version=f"{PROGRAM} {version}")
-    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
+    parser.set_defaults(command=functools.partial(_print_help, parser))
     add = functools.partial(_add_command, commands)
     add(
         "report",
@@ -113,7 +135,18 @@ def _parser() -> argparse.ArgumentParser:
     stiffness = add("stiffness", run_stiffness, what, "FILE", needed=True, signals=False)
     stiffness.add_argument("--dof", action="append", metavar="A,B", help="DOF that is moved; several move together")
     _add_frequencies(stiffness)
+    stiffness.add_argument("--db", action="store_true", help="modulus of the figure in dB re 1 N/m")
     stiffness.add_argument("--log", action="store_true", help="logarithmic axes and frequencies instead of linear ones")
+    what = "write the motion of a DOF per motion of another over Hz (png, svg, pdf), or the numbers (csv)"
+    passed = add("transmissibility", run_transmissibility, what, "FILE", needed=True, signals=False)
+    passed.add_argument(
+        "--from", dest="from_", action="append", required=True, metavar="A,B", help="DOF that is moved or pushed"
+    )
+    passed.add_argument("--to", action="append", required=True, metavar="A,B", help="DOF whose motion or force it is")
+    passed.add_argument("--force", action="store_true", help="force on the held DOF per force, instead of motions")
+    _add_frequencies(passed)
+    passed.add_argument("--db", action="store_true", help="modulus of the figure in dB")
+    passed.add_argument("--linear", action="store_true", help="linear axes and frequencies instead of logarithmic ones")
     regulator = add("lqr", run_lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
     for kind in WEIGHTS:
         regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
@@ -122,9 +155,21 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _print_help(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> int:  # noqa: ARG001  # as commands
+    parser.print_help()
+    return DONE
+
+
+def _known_parameters() -> str:
+    known = (f"of {name}: {', '.join(inspect.signature(make).parameters)}" for name, make in BUILT_IN.items())
+    return f"parameter of a built-in model; {'; '.join(known)}"
+
+
 def _add_frequencies(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--omega-min", type=float, metavar="W", help="lowest frequency [rad/s]")
     parser.add_argument("--omega-max", type=float, metavar="W", help="highest frequency [rad/s]")
+    parser.add_argument("--f-min", type=float, metavar="F", help="lowest frequency [Hz]")
+    parser.add_argument("--f-max", type=float, metavar="F", help="highest frequency [Hz]")
     parser.add_argument("--points", type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})")
 
 
@@ -139,15 +184,19 @@ def _add_command(
     signals: bool = True,
 ) -> argparse.ArgumentParser:
     parser = commands.add_parser(
-        name, help=purpose, description=f"{purpose[0].upper()}{purpose[1:]}.", allow_abbrev=False
+        name,
+        help=purpose,
+        description=f"{purpose[0].upper()}{purpose[1:]}.",
+        epilog=f"Example: {PROGRAM} {name} {EXAMPLES[name]}",
+        allow_abbrev=False,
     )
-    parser.set_defaults(command=command)
+    parser.set_defaults(command=command, alone=False)
     parser.add_argument(
         "model",
         metavar="MODEL",
         help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
     )
-    parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help="parameter of a built-in model")
+    parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help=_known_parameters())
     what = "name of a matrix in a file with several: C=D, K=sys.K, M=maa#2; C= for none"
     parser.add_argument("--matrix", action="append", default=[], metavar="K=NAME", help=what)
     parser.add_argument(

@@ -3,20 +3,25 @@
 import argparse
 import functools
 import inspect
-import math
 import os
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeAlias, TypedDict, overload
+from typing import TypeAlias, TypedDict
 
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, LostStateWarning, ParameterError
+from halfdof_ctrl.base.errors import (
+    FileFormatError,
+    HalfdofError,
+    LostStateWarning,
+    ParameterError,
+    give_warning,
+    recording_warnings,
+)
 from halfdof_ctrl.base.names import listed, motions
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
-from halfdof_ctrl.files.containers import MATRIX_ENDINGS, ending
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS
 from halfdof_ctrl.files.folders import several_models
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.models import inspect_files, load_model
@@ -27,8 +32,9 @@ from halfdof_ctrl.model.law_text import element_from_text
 from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.response import nonlinear_response
+from halfdof_ctrl.option_texts import assignments, chosen_frequencies, listed_names, require_ending, require_finite
 from halfdof_ctrl.parts.mounts import hydromount
-from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot
+from halfdof_ctrl.plots import bode_plot, dynamic_stiffness_plot, pole_map_plot, step_plot, transmissibility_plot
 from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
@@ -46,7 +52,12 @@ from halfdof_ctrl.systems.frequency import (
 )
 from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
-from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies
+from halfdof_ctrl.systems.stiffness import (
+    TransmissibilityKind,
+    dynamic_stiffness_response,
+    motion_frequencies,
+    transmissibility_response,
+)
 from halfdof_ctrl.systems.time_response import step_response
 from halfdof_ctrl.systems.working_states import working_system
 
@@ -56,9 +67,9 @@ BUILT_IN = {"hydromount": hydromount}
 BUILT_IN_SIGNALS: dict[str, _Signals] = {
     "hydromount": (("F_y",), ("y", "y_dot"))
 }  #: what is shown unless the user asks for others
+BUILT_IN_ALONE = {"hydromount": {"m": 0.0}}  #: parameters of the part without what it carries, whose stiffness is meant
 BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
 LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
-FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
 
@@ -111,7 +122,7 @@ def run_info(arguments: argparse.Namespace) -> int:
 
 def run_ss(arguments: argparse.Namespace) -> int:
     """Write or print the state space."""
-    _require_ending(arguments.o, MATRIX_ENDINGS)
+    require_ending(arguments.o, MATRIX_ENDINGS)
     system = mech2ss(_model(arguments), states=arguments.states)
     if arguments.o is None:
         print(system)
@@ -122,10 +133,10 @@ def run_ss(arguments: argparse.Namespace) -> int:
 
 def run_bode(arguments: argparse.Namespace) -> int:
     """Draw or tabulate the frequency response."""
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    kind = require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
     model = _model(arguments)
     usual = FEW_POINTS if has_many_states(model) else DEFAULT_POINTS
-    omega = _frequencies(lambda: model_frequencies(model), arguments, usual=usual)
+    omega = chosen_frequencies(lambda: model_frequencies(model), arguments, usual=usual)
     if kind in TABLE_ENDINGS:
         save_response(frequency_response(model, omega), arguments.o)
     else:
@@ -134,37 +145,68 @@ def run_bode(arguments: argparse.Namespace) -> int:
 
 
 def run_stiffness(arguments: argparse.Namespace) -> int:
-    """Draw the dynamic stiffness or the transmissibility."""
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    """Draw or tabulate the dynamic stiffness; a built-in model is a mount, and stands without what it carries."""
+    arguments.alone = True
+    kind = require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
     model = _model(arguments)
     dof = _driven(model, arguments)
     grid = functools.partial(motion_frequencies, [model], dof, free=True, linear=not arguments.log)
-    omega = _frequencies(grid, arguments, linear=not arguments.log)
+    omega = chosen_frequencies(grid, arguments, linear=not arguments.log)
     if kind in TABLE_ENDINGS:
         save_response(dynamic_stiffness_response(model, dof, grid() if omega is None else omega), arguments.o)
     else:
         scale: Scale = "log" if arguments.log else "linear"
-        save_figure(dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale), arguments.o)
+        plot = dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale, dB=arguments.db)
+        save_figure(plot, arguments.o)
+    return DONE
+
+
+def run_transmissibility(arguments: argparse.Namespace) -> int:
+    """Draw or tabulate the transmissibility between two DOFs."""
+    kind = require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    model = _model(arguments)
+    from_, to = listed_names(arguments.from_, ()), listed_names(arguments.to, ())
+    what: TransmissibilityKind = "force" if arguments.force else "motion"
+    held, other = (from_, to) if what == "motion" else (to, from_)
+    grid = functools.partial(motion_frequencies, [model], held, other=other, linear=arguments.linear)
+    omega = chosen_frequencies(grid, arguments, linear=arguments.linear)
+    if kind in TABLE_ENDINGS:
+        points = grid() if omega is None else omega
+        save_response(transmissibility_response(model, from_, to, points, kind=what), arguments.o)
+    else:
+        scale: Scale = "linear" if arguments.linear else "log"
+        save_figure(
+            transmissibility_plot(model, from_, to, omega, kind=what, xscale=scale, yscale=scale, dB=arguments.db),
+            arguments.o,
+        )
     return DONE
 
 
 def run_step(arguments: argparse.Namespace) -> int:
     """Draw or tabulate the step response."""
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
+    kind = require_ending(arguments.o, (*FIGURE_ENDINGS, *TABLE_ENDINGS))
     given = _given_model(arguments)
     if isinstance(given, NonlinearModel):
         return _nonlinear_step(given, arguments, kind)
     model = given
     if kind in TABLE_ENDINGS:
-        save_response(step_response(_with_recovered(model), arguments.time), arguments.o)
+        with np.errstate(over="ignore", invalid="ignore"):  # which is refused below
+            response = step_response(_with_recovered(model), arguments.time)
+        require_finite(response.t, response.y)
+        save_response(response, arguments.o)
     else:
-        save_figure(step_plot(model, arguments.time, title=model.name), arguments.o)
+        with np.errstate(over="ignore", invalid="ignore"):
+            plot = step_plot(model, arguments.time, title=model.name)
+        for axes in plot.axes.flat:
+            for line in axes.get_lines():
+                require_finite(line.get_xdata(), line.get_ydata())
+        save_figure(plot, arguments.o)
     return DONE
 
 
 def run_poles(arguments: argparse.Namespace) -> int:
     """Print the eigenvalues of both forms, or draw them."""
-    _require_ending(arguments.o, FIGURE_ENDINGS)
+    require_ending(arguments.o, FIGURE_ENDINGS)
     model = _model(arguments)
     table = eigenvalue_table(model, working_system(model))
     if arguments.o is not None:
@@ -175,7 +217,7 @@ def run_poles(arguments: argparse.Namespace) -> int:
 
 def run_lqr(arguments: argparse.Namespace) -> int:
     """Design a state feedback, print it or write it."""
-    kind = _require_ending(arguments.o, (*FIGURE_ENDINGS, *GAIN_ENDINGS))
+    kind = require_ending(arguments.o, (*FIGURE_ENDINGS, *GAIN_ENDINGS))
     model = _model(arguments)
     feedback, words = _feedback(model, arguments)
     if kind in FIGURE_ENDINGS:
@@ -190,7 +232,7 @@ def run_lqr(arguments: argparse.Namespace) -> int:
 
 def run_check(arguments: argparse.Namespace) -> int:
     """Run the cross-check; exit code 1 where it fails."""
-    _require_ending(arguments.o, (".json",))
+    require_ending(arguments.o, (".json",))
     model = _model(arguments)
     check = crosscheck(model, mech2ss(model))
     if arguments.o is not None:
@@ -208,9 +250,11 @@ def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: 
     if len(model.inputs) != 1:
         msg = f"A nonlinear model takes a step of one input; choose it by --inputs: {listed(model.inputs)}."
         raise ParameterError(msg, parameter="--inputs", value=model.inputs)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", LostStateWarning)  # of the tangent that only says how long to look
+    with recording_warnings() as caught:
         system = mech2ss(model.tangent())
+    for message, category in caught:
+        if category is not LostStateWarning:  # of the tangent that only says how long to look
+            give_warning(message, category)
     times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
     save_response(nonlinear_response(model, times, arguments.amplitude), arguments.o)
     return DONE
@@ -232,7 +276,8 @@ def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearM
             msg = f"--matrix, --triangle and --remove-fixed are about files; {name} is built in."
             raise ParameterError(msg, parameter="--matrix", value=arguments.matrix)
         signals = BUILT_IN_SIGNALS[name]
-        model = BUILT_IN[name](**_parameters(name, arguments.p))
+        alone = BUILT_IN_ALONE[name] if arguments.alone else {}
+        model = BUILT_IN[name](**(alone | _parameters(name, arguments.p)))
     else:
         if arguments.p:
             msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN)}); {name} is a file."
@@ -246,7 +291,7 @@ def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearM
         known = model.elements if isinstance(model, NonlinearModel) else ()
         model = nlmechss(model.linear if isinstance(model, NonlinearModel) else model, [*known, *elements])
     inputs, outputs = signals or (None, None)
-    return model.select(_listed(arguments.inputs, inputs), _listed(arguments.outputs, outputs))
+    return model.select(listed_names(arguments.inputs, inputs), listed_names(arguments.outputs, outputs))
 
 
 class _FileOptions(TypedDict):
@@ -273,79 +318,17 @@ def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]
     if arguments.dof is None and default is None:
         msg = f"--dof must name the DOF whose dynamic stiffness is meant: {listed(model.dofs)}."
         raise ParameterError(msg, parameter="--dof", value=None)
-    return _listed(arguments.dof, [str(default)])
+    return listed_names(arguments.dof, [str(default)])
 
 
 def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
     known = list(inspect.signature(BUILT_IN[name]).parameters)
-    parameters = _assignments(given, "-p")
+    parameters = assignments(given, "-p")
     for symbol in parameters:
         if symbol not in known:
             msg = f"{name} has no parameter {symbol!r}. Known: {', '.join(known)}."
             raise ParameterError(msg, parameter=symbol, value=parameters[symbol])
     return parameters
-
-
-def _assignments(given: Sequence[str], option: str) -> dict[str, float]:
-    """Read NAME=VALUE texts."""
-    values: dict[str, float] = {}
-    for text in given:
-        name, _, value = text.rpartition("=")
-        if not name:
-            msg = f"{option} takes a name and a number, NAME=VALUE, not {text!r}."
-            raise ParameterError(msg, parameter=option, value=text)
-        if name in values:
-            msg = f"{option} gives {name} twice."
-            raise ParameterError(msg, parameter=option, value=text)
-        values[name] = _number(value, f"{option} {name}")
-    return values
-
-
-def _number(text: str, what: str) -> float:
-    try:
-        return float(text)
-    except ValueError as cause:
-        msg = f"{what} must be a number, not {text!r}."
-        raise ParameterError(msg, parameter=what, value=text) from cause
-
-
-@overload
-def _listed(given: Sequence[str] | None, default: Sequence[str]) -> list[str]: ...
-
-
-@overload
-def _listed(given: Sequence[str] | None, default: None) -> list[str] | None: ...
-
-
-def _listed(given: Sequence[str] | None, default: Sequence[str] | None) -> list[str] | None:
-    """Split lists with commas; None where nothing is given and there is no default."""
-    if given is None:
-        return None if default is None else list(default)
-    return [name.strip() for text in given for name in text.split(",") if name.strip()]
-
-
-def _frequencies(
-    default: Callable[[], np.ndarray],
-    arguments: argparse.Namespace,
-    *,
-    linear: bool = False,
-    usual: int = DEFAULT_POINTS,
-) -> np.ndarray | None:
-    """Choose the frequencies [rad/s] if any of the limits or their number is given, the others from a default grid."""
-    low, high, points = arguments.omega_min, arguments.omega_max, arguments.points
-    if low is None and high is None and points is None:
-        return None
-    around = default() if low is None or high is None else np.zeros(0)
-    low = around[0] if low is None else low
-    high = around[-1] if high is None else high
-    if not (math.isfinite(high) and 0.0 <= low < high and (linear or low > 0.0)):
-        msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
-        raise ParameterError(msg, parameter="--omega-min", value=low)
-    points = usual if points is None else points
-    if not FEWEST_POINTS <= points <= MOST_POINTS:
-        msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
-        raise ParameterError(msg, parameter="--points", value=points)
-    return np.linspace(low, high, points) if linear else np.geomspace(low, high, points)
 
 
 def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
@@ -359,7 +342,7 @@ def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
 
 
 def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[StateFeedback, str]:
-    weights = {kind: _assignments(_listed(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
+    weights = {kind: assignments(listed_names(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
     if arguments.energy is None and not any(weights.values()):
         return default_design(model)
     return lqr(
@@ -370,8 +353,3 @@ def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[S
         effort=weights["effort"],
         energy=arguments.energy,
     ), ""
-
-
-def _require_ending(path: str | None, known: Sequence[str]) -> str | None:
-    """Refuse an ending before anything is computed."""
-    return None if path is None else ending(path, known)

@@ -8,14 +8,20 @@ import json
 import math
 import secrets
 import shutil
-import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import control
 import numpy as np
 
-from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, WeightError, own_messages, recording_warnings
+from halfdof_ctrl.base.errors import (
+    FileFormatError,
+    HalfdofError,
+    WeightError,
+    give_warning,
+    own_messages,
+    recording_warnings,
+)
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
@@ -94,14 +100,13 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
         findings = _found(model)
         shown, cut = _shown(model)
         plots = _plots(model, shown, findings.feedback)
-    said = {str(warning.message): warning for warning in caught}
-    for warning in said.values():
-        warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
+    for message, category in dict(caught).items():
+        give_warning(message, category)
     findings.notes.extend([*own_messages(caught), *cut])
     build = target.with_name(f".{target.name[:100]}.{secrets.token_hex(4)}.part")
-    with naming_target(folder):
-        build.mkdir()
     try:
+        with naming_target(folder):
+            build.mkdir()
         _fill(build, findings, plots)
         _move(build, target)
     finally:

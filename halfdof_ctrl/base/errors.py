@@ -8,6 +8,8 @@ import sys
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import NamedTuple
 
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
@@ -259,18 +261,38 @@ class HalfdofWarning(UserWarning):
     """Base of every warning of this package."""
 
 
+class RecordedWarning(NamedTuple):
+    """A warning of this package that was held back."""
+
+    message: str
+    category: type[HalfdofWarning]
+
+
+#: the warnings held back in this thread; those of the standard library's filters belong to the whole process
+_RECORD: ContextVar[list[RecordedWarning] | None] = ContextVar("halfdof_ctrl_warnings", default=None)
+
+
+def give_warning(message: str, category: type[HalfdofWarning]) -> None:
+    """Warn the line of the user's that called this package, or let who records warnings in this thread have it."""
+    record = _RECORD.get()
+    if record is None:
+        warnings.warn(message, category, stacklevel=callers_level())
+    else:
+        record.append(RecordedWarning(message, category))
+
+
 @contextmanager
-def recording_warnings() -> Iterator[list[warnings.WarningMessage]]:
-    """Record every warning of this package, also one that was given before, and what the filters let through of others.
-
-    Nothing is hidden from filters that turn other packages' warnings into errors.
-    """
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.filterwarnings("always", category=HalfdofWarning)
+def recording_warnings() -> Iterator[list[RecordedWarning]]:
+    """Hold back the warnings that this package gives in this thread; the filters of the process are not touched."""
+    caught: list[RecordedWarning] = []
+    before = _RECORD.set(caught)
+    try:
         yield caught
+    finally:
+        _RECORD.reset(before)
 
 
-def own_messages(caught: Iterable[warnings.WarningMessage]) -> list[str]:
+def own_messages(caught: Iterable[warnings.WarningMessage | RecordedWarning]) -> list[str]:
     """Give the texts of this package's own warnings, each once: the user can do nothing about other packages'."""
     own = (warning for warning in caught if issubclass(warning.category, HalfdofWarning))
     return list(dict.fromkeys(str(warning.message) for warning in own))

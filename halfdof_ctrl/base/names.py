@@ -5,6 +5,7 @@ For a DOF ``y`` the package knows the force ``F_y``, the displacement, velocity 
 labels, which finite-element labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
 """
 
+import unicodedata
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from typing import Literal, TypeAlias
@@ -20,6 +21,7 @@ SIGNAL_WORDS = {
     "input": ("u", "the unit force on a DOF", "B"),
     "output": ("y", "a DOF's motion", "F, G, H"),
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
+UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  #: categories of Unicode that a terminal or a table obeys instead of showing
 MOST_CACHED = 1000  #: names of larger models are made anew each time, since a cache would hold on to them
 
 
@@ -132,11 +134,36 @@ def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[st
         bad = [repr(name) for name in names if not (isinstance(name, str) and name.strip() == name and name)]
         msg = f"Names of {what} must be non-empty text without blanks at the ends, not {listed(bad)}."
         raise SignalNameError(msg, names=tuple(bad))
+    odd = [repr(name) for name in names if not name.isprintable() and _acts_on_a_terminal(name)]
+    if odd:
+        msg = f"Names of {what} hold control characters, which terminals and tables obey: {listed(odd)}. Rename them."
+        raise SignalNameError(msg, names=tuple(odd))
     if len(set(names)) != count:
         twice = _duplicates(names)
         msg = f"Names of {what} must differ, but {listed(twice)} stands more than once. Rename all but one."
         raise SignalNameError(msg, names=twice)
     return names
+
+
+def _acts_on_a_terminal(text: str) -> bool:
+    """Tell whether text holds control characters (Cc), marks that turn the direction of text (Cf), or line ends."""
+    return any(unicodedata.category(letter) in UNPRINTED for letter in text)
+
+
+def printable(text: str) -> str:
+    r"""Write control characters other than line ends and tabs as escapes, so that a terminal obeys none of them.
+
+    >>> printable("a\x1b[31m")
+    'a\\x1b[31m'
+    """
+    if text.isprintable():
+        return text
+    return "".join(
+        letter.encode("unicode_escape").decode()
+        if letter not in "\n\t" and unicodedata.category(letter) in UNPRINTED
+        else letter
+        for letter in text
+    )
 
 
 def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:

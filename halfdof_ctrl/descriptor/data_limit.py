@@ -5,12 +5,10 @@ are rounded. Then every solver that sees only these numbers errs alike, and a ch
 nothing. So (DATA) is found where P(s) is nearly singular, and said where it matters.
 """
 
-import warnings
-
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import DataLimitWarning, callers_level
+from halfdof_ctrl.base.errors import DataLimitWarning, give_warning
 from halfdof_ctrl.model.evaluation import data_limit, transfer_and_growth
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -70,4 +68,4 @@ def warn_of_data(
         "these numbers errs alike. Solutions are refined for the numbers as they are stored; for more digits use fewer "
         "elements, or take out what is stiff as a rigid connection."
     )
-    warnings.warn(msg, DataLimitWarning, stacklevel=callers_level())
+    give_warning(msg, DataLimitWarning)

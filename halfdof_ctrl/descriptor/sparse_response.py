@@ -3,12 +3,10 @@
 Frequencies are worked from coarse to fine, so that what is done when the user stops it covers the whole range.
 """
 
-import warnings
-
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import InterruptedResponseWarning, callers_level
+from halfdof_ctrl.base.errors import InterruptedResponseWarning, give_warning
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.data_limit import warn_of_data
@@ -74,7 +72,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
             f"Interrupted after {np.count_nonzero(done)} of {frequencies.size} frequencies: the response holds those "
             "that are done, spread over the whole range."
         )
-        warnings.warn(msg, InterruptedResponseWarning, stacklevel=callers_level())
+        give_warning(msg, InterruptedResponseWarning)
         values, frequencies = values[:, :, done], frequencies[done]
         limit = DataLimit(limit.data[:, :, done], limit.slope[:, :, done])
     warn_of_data(model, frequencies, values, limit, frequencies.size)

@@ -4,13 +4,11 @@
 [ F(s)   D(s) ]                                                                        (9)
 """
 
-import warnings
-
 import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
-from halfdof_ctrl.base.errors import CloseDecisionWarning, callers_level
+from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.growth import system_pencil
@@ -79,7 +77,7 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
             f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs "
             "depend on each other but for rounding, or the model is rounded; leave one out by select() and compare."
         )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+        give_warning(msg, CloseDecisionWarning)
     return sorted_eigenvalues(found.values)
 
 

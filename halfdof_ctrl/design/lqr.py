@@ -14,7 +14,6 @@ A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is t
     M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
 """
 
-import warnings
 from dataclasses import dataclass, replace
 
 import control
@@ -23,7 +22,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, callers_level
+from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, give_warning
 from halfdof_ctrl.base.names import force_names, listed, motion_names
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
@@ -256,7 +255,7 @@ def _solved(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | No
             f"The gain is known to {best.error:.1e} of its size only: that is what rounding of the entries of A, B, Q "
             "and R does to it. The closed loop is stable; weights nearer to each other give a gain with more digits."
         )
-        warnings.warn(msg, InaccurateGainWarning, stacklevel=callers_level())
+        give_warning(msg, InaccurateGainWarning)
     return best
 
 

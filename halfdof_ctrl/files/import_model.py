@@ -4,7 +4,6 @@ Matrices come from `assembly`; here they become a `SecondOrderModel`, and what l
 """
 
 import os
-import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,7 @@ from halfdof_ctrl.base.errors import (
     FileFormatError,
     ImportedModelWarning,
     ParameterError,
-    callers_level,
+    give_warning,
 )
 from halfdof_ctrl.base.names import checked_names
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
@@ -56,7 +55,7 @@ def import_model(
     said = tuple(matrices or ())
     doubts = () if found.own_layout else found.report.warnings  # what save_model wrote is as it was meant
     for text in (*doubts, *([] if chosen_by_hand else _missing(found, said))):
-        warnings.warn(f"{first}: {text}", ImportedModelWarning, stacklevel=callers_level())
+        give_warning(f"{first}: {text}", ImportedModelWarning)
     with naming_the_file(first):
         return _model(found)
 

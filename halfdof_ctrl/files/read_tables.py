@@ -12,7 +12,7 @@ from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.files.containers import PathLike, ending
 from halfdof_ctrl.files.stiffness_tables import is_stiffness_table, stiffness_response
-from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD
+from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
 
 
 def load_response(path: PathLike) -> control.FrequencyResponseData | control.TimeResponseData:
@@ -55,9 +55,9 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     rows = list(csv.reader(text.splitlines(), delimiter=_separator(text)))
     header = rows[0] if rows else []
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
-        return _frequency_response(header, _numbers(rows, path), path)
+        return _frequency_response(list(map(without_guard, header)), _numbers(rows, path), path)
     if header[:1] == [TIME_HEAD]:
-        return _time_response(header[1:], _numbers(rows, path))
+        return _time_response(list(map(without_guard, header[1:])), _numbers(rows, path))
     if is_stiffness_table(header):
         return stiffness_response(header, _numbers(rows, path), path)
     msg = (

@@ -15,6 +15,8 @@ from halfdof_ctrl.files.writing import replacing, save_matrices
 from halfdof_ctrl.systems.phase import response_phase
 
 TABLE_ENDINGS = (".csv",)
+#: of a cell that a spreadsheet works out, and the mark that keeps it from that
+GUARD, FORMULA_STARTS = "'", ("=", "+", "-", "@", "'")
 FREQUENCY_HEAD = ("omega [rad/s]", "f [Hz]")  #: first columns of a frequency response
 PARTS = ("real", "imag", "magnitude", "phase [deg]")  #: columns of a channel
 TIME_HEAD = "t [s]"  #: first column of a time response
@@ -63,8 +65,20 @@ def save_gain(feedback: StateFeedback, path: PathLike) -> None:
         names = {"inputs": feedback.inputs, "states": feedback.states}
         save_matrices(path, {"K": np.asarray(feedback.K)}, names, None)
         return
-    rows = ([name, *map(repr, row)] for name, row in zip(feedback.inputs, feedback.K.tolist(), strict=True))
+    rows = (
+        [_no_formula(name), *map(repr, row)] for name, row in zip(feedback.inputs, feedback.K.tolist(), strict=True)
+    )
     _save_table(path, ["input", *feedback.states], rows)
+
+
+def without_guard(cell: str) -> str:
+    """Take away what `_no_formula` put before a name."""
+    return cell[1:] if cell.startswith(GUARD) and cell[1:].startswith(FORMULA_STARTS) else cell
+
+
+def _no_formula(cell: str) -> str:
+    """Put an apostrophe before a name that a spreadsheet would take for a formula."""
+    return GUARD + cell if cell.startswith(FORMULA_STARTS) else cell
 
 
 def save_response(data: control.FrequencyResponseData | control.TimeResponseData, path: PathLike) -> None:
@@ -95,6 +109,6 @@ def _save_table(path: PathLike, header: Sequence[str], rows: Iterable[Iterable[s
     with replacing(path) as stream:
         text = io.TextIOWrapper(stream, encoding="utf-8", newline="")
         writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(header)
+        writer.writerow([_no_formula(cell) for cell in header])
         writer.writerows(rows)
         text.detach()

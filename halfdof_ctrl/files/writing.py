@@ -25,7 +25,7 @@ def replacing(path: PathLike) -> Iterator[BinaryIO]:
     try:
         with naming_target(path):
             stream = temporary.open("xb")
-        with stream:
+        with naming_full_disk(path), stream:
             yield stream
         with naming_target(path):
             temporary.replace(target)
@@ -33,6 +33,17 @@ def replacing(path: PathLike) -> Iterator[BinaryIO]:
         with suppress(OSError):
             temporary.unlink()
         raise
+
+
+@contextmanager
+def naming_full_disk(path: PathLike) -> Iterator[None]:
+    """Let a failed write tell of the target: the system says which file it was only when one is opened."""
+    try:
+        yield
+    except OSError as cause:
+        if cause.filename is not None or cause.errno is None:
+            raise
+        raise OSError(cause.errno, cause.strerror, str(path)) from cause
 
 
 @contextmanager

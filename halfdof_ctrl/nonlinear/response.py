@@ -6,7 +6,6 @@ rest) come to rest in finite time; they are eased below the tolerance (`easing`)
 """
 
 import math
-import warnings
 from bisect import bisect_right
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from halfdof_ctrl.base.errors import (
     MatrixError,
     NoAnswerError,
     ParameterError,
-    callers_level,
+    give_warning,
 )
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.progress import progress_bar
@@ -117,7 +116,7 @@ def nonlinear_response(
             "done, and "
             "the response ends there."
         )
-        warnings.warn(msg, InterruptedResponseWarning, stacklevel=callers_level())
+        give_warning(msg, InterruptedResponseWarning)
     return _response(reduction, forcing, times[:reached], states[:, :reached])
 
 

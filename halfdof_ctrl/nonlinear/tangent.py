@@ -1,11 +1,10 @@
 """The tangent of a nonlinear model: M, C and K for small motions about a state."""
 
-import warnings
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from halfdof_ctrl.base.errors import LostStateWarning, callers_level
+from halfdof_ctrl.base.errors import LostStateWarning, give_warning
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import Values
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -55,4 +54,4 @@ def _warn_of_lost_states(reduction: "NonlinearReduction", model: SecondOrderMode
         "the law "
         "a linear part."
     )
-    warnings.warn(msg, LostStateWarning, stacklevel=callers_level())
+    give_warning(msg, LostStateWarning)

@@ -55,11 +55,12 @@ def prepared_axes(
     """
     rows, columns = shape
     if ax is None:
-        # the figure comes first: what the first one switches on in a notebook, rc_context would switch off again
         figure = plt.figure(figsize=(max(FIGURE_WIDTH, 3.0 * columns), height), layout="constrained")
         heights = None if ratios is None else list(ratios)
-        with plt.rc_context(control.config.defaults["ctrlplot.rcParams"] if columns > 1 else {}):
-            return figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=heights)
+        axes = figure.subplots(rows, columns, squeeze=False, sharex="col", height_ratios=heights)
+        if columns > 1:
+            _small_text(axes)
+        return axes
     given = np.asarray(ax, dtype=object)
     if not all(isinstance(entry, Axes) for entry in given.flat):
         msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."
@@ -71,6 +72,16 @@ def prepared_axes(
         )
         raise ParameterError(msg, parameter="ax", value=given.shape)
     return given.reshape(shape)
+
+
+def _small_text(axes: AxesArray) -> None:
+    """Write as small as python-control does where axes stand side by side; rcParams belong to the whole process."""
+    sizes = control.config.defaults["ctrlplot.rcParams"]
+    for one in axes.flat:
+        one.title.set_size(sizes["axes.titlesize"])
+        for axis, letter in ((one.xaxis, "x"), (one.yaxis, "y")):
+            axis.label.set_size(sizes["axes.labelsize"])
+            axis.set_tick_params(labelsize=sizes[f"{letter}tick.labelsize"])
 
 
 def no_lines(axes: AxesArray) -> npt.NDArray[Any]:

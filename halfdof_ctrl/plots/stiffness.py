@@ -57,6 +57,7 @@ def dynamic_stiffness_plot(
     xscale: Scale = "linear",
     yscale: Scale = "linear",
     Hz: bool = True,
+    dB: bool = False,
     grid: bool = True,
     title: str | None = None,
     label: Labels = None,
@@ -79,6 +80,8 @@ def dynamic_stiffness_plot(
         Axes of the frequency and of the modulus.
     Hz : bool
         Frequency axis in Hz, else in rad/s.
+    dB : bool
+        Modulus in decibels of its unit; `yscale` is then linear.
     grid : bool
         Draw grid lines.
     title : str, optional
@@ -116,10 +119,10 @@ def dynamic_stiffness_plot(
     names = as_tuple(dof)
     unit = _ratio_unit(models[0], units, force_names(names), names)
     axes = _prepared(ax, "modulus and loss angle")
-    lines = _draw(axes, responses, texts, Hz=Hz)
-    label_y(axes[0, 0], f"dynamic stiffness\nat {plain('+'.join(names))}{unit}")
+    lines = _draw(axes, responses, texts, Hz=Hz, dB=dB)
+    label_y(axes[0, 0], f"dynamic stiffness\nat {plain('+'.join(names))}{_decibels(unit) if dB else unit}")
     label_y(axes[1, 0], "loss angle [deg]")
-    _dress(axes, xscale, yscale, Hz=Hz, grid=grid)
+    _dress(axes, xscale, None if dB else yscale, Hz=Hz, grid=grid)
     if title is None and ax is None:
         title = _title(models, f"dynamic stiffness at {'+'.join(names)}")
     return finished_plot(lines, axes, title, models[0], own=ax is None)
@@ -136,6 +139,7 @@ def transmissibility_plot(
     xscale: Scale = "log",
     yscale: Scale = "log",
     Hz: bool = True,
+    dB: bool = False,
     grid: bool = True,
     title: str | None = None,
     label: Labels = None,
@@ -149,7 +153,7 @@ def transmissibility_plot(
         Each gives a curve of `transmissibility`, from its descriptor form.
     from_, to, kind
         As in `transmissibility`.
-    omega, ax, xscale, yscale, Hz, grid, title, label, units
+    omega, ax, xscale, yscale, Hz, dB, grid, title, label, units
         As in `dynamic_stiffness_plot`; the axes are logarithmic by default, since isolation is a slope.
 
     Returns
@@ -182,10 +186,13 @@ def transmissibility_plot(
         unit = _ratio_unit(models[0], units, force_names(results), force_names(causes))
         causes, results = force_names(causes), reaction_names(results)
     axes = _prepared(ax, "modulus and phase")
-    lines = _draw(axes, responses, texts, Hz=Hz)
-    label_y(axes[0, 0], f"transmissibility\n|{plain('+'.join(results))}/{plain('+'.join(causes))}|{unit}")
+    lines = _draw(axes, responses, texts, Hz=Hz, dB=dB)
+    label_y(
+        axes[0, 0],
+        f"transmissibility\n|{plain('+'.join(results))}/{plain('+'.join(causes))}|{_decibels(unit) if dB else unit}",
+    )
     label_y(axes[1, 0], "phase [deg]")
-    _dress(axes, xscale, yscale, Hz=Hz, grid=grid)
+    _dress(axes, xscale, None if dB else yscale, Hz=Hz, grid=grid)
     if title is None and ax is None:
         title = _title(
             models, f"transmissibility of {kind} from {'+'.join(as_tuple(from_))} to {'+'.join(as_tuple(to))}"
@@ -232,21 +239,33 @@ def _ratio_unit(model: SecondOrderModel, units: Units, over: Sequence[str], unde
 
 
 def _draw(
-    axes: AxesArray, responses: Sequence[control.FrequencyResponseData], texts: Sequence[str], *, Hz: bool
+    axes: AxesArray, responses: Sequence[control.FrequencyResponseData], texts: Sequence[str], *, Hz: bool, dB: bool
 ) -> npt.NDArray[np.object_]:
     lines = no_lines(axes)
     for response, text in zip(responses, texts, strict=True):
         omega, values = np.asarray(response.omega, dtype=float), np.asarray(response.frdata)[0, 0]
         x = omega / (2.0 * np.pi) if Hz else omega
-        lines[0, 0] += axes[0, 0].plot(x, np.abs(values), label=text, linewidth=1.5)
+        lines[0, 0] += axes[0, 0].plot(x, _in_decibels(values) if dB else np.abs(values), label=text, linewidth=1.5)
         lines[1, 0] += axes[1, 0].plot(x, np.degrees(response_phase(response)[0, 0]), label=text, linewidth=1.5)
     return lines
 
 
-def _dress(axes: AxesArray, xscale: Scale, yscale: Scale, *, Hz: bool, grid: bool) -> None:
-    """Set scales, ticks and grid of both axes."""
+def _decibels(unit: str) -> str:
+    """Return the unit in brackets of a modulus in decibels."""
+    return f" [dB re 1 {unit.strip(' []')}]" if unit.strip(" []-") else " [dB]"
+
+
+def _in_decibels(values: npt.NDArray[np.complex128]) -> FloatArray:
+    """Return the modulus in decibels, NaN where it is zero."""
+    modulus = np.abs(values)
+    return np.asarray(20.0 * np.log10(modulus, out=np.full(modulus.shape, np.nan), where=modulus > 0.0))
+
+
+def _dress(axes: AxesArray, xscale: Scale, yscale: Scale | None, *, Hz: bool, grid: bool) -> None:
+    """Set scales, ticks and grid of both axes; decibels have no scale to choose."""
     above, below = axes[:, 0]
-    _set_magnitude(above, yscale)
+    if yscale is not None:
+        _set_magnitude(above, yscale)
     _set_angle(below)
     for ax in (above, below):
         if xscale == "linear" or (np.concatenate([line.get_xdata() for line in ax.get_lines()]) > 0.0).any():

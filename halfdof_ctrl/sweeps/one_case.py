@@ -54,8 +54,16 @@ class CaseError:
     @classmethod
     def of(cls, error: BaseException) -> "CaseError":
         """Keep of an exception what can be sent anywhere."""
-        text = "".join(traceback.format_exception(error))
-        return cls(kind=type(error).__name__, message=str(error), traceback=text)
+        kind = type(error).__name__
+        try:
+            message = str(error)
+        except Exception as broken:  # noqa: BLE001  # the user's own __str__ raises what it likes
+            message = f"its words cannot be read: {type(broken).__name__}"
+        try:
+            text = "".join(traceback.format_exception(error))
+        except Exception:  # noqa: BLE001  # as above, or a __cause__ of that kind
+            text = "".join(traceback.format_tb(error.__traceback__)) + kind
+        return cls(kind=kind, message=message, traceback=text)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)

@@ -5,21 +5,20 @@ what another function makes of the model. Any `concurrent.futures.Executor` can 
 fails leaves NaN in the arrays and a named failure.
 """
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, callers_level
+from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.threads import available_cores
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.sweeps.cases import Parameters, listed_cases, require_accepted
-from halfdof_ctrl.sweeps.one_case import CaseError, CaseWork, Constant, FrequencyWork, Quantity
+from halfdof_ctrl.sweeps.one_case import CaseError, CaseWork, Constant, FrequencyWork, Quantity, System, selected
 from halfdof_ctrl.sweeps.process_pool import Work
 from halfdof_ctrl.sweeps.result import Outcome, SweepResult, joined_cases, joined_frequencies
 from halfdof_ctrl.sweeps.workers import work_through
@@ -91,6 +90,8 @@ def sweep(
     ParameterError
         Parameters that the function does not take, no values, a response without frequencies, and other requests
         without a meaning; all before anything is computed.
+    SignalNameError
+        Inputs or outputs that the system of the first case does not have; it is made here to see.
     WorkerError
         Processes that cannot start, or a function that cannot be sent to them.
     SweepInterruptedError
@@ -140,7 +141,7 @@ def sweep(
     result = plan.join(outcomes)
     if result.failures:
         msg = f"{len(result.failures)} of {len(outcomes)} {plan.what} failed, first {result.failures[0]}"
-        warnings.warn(msg, FailedCasesWarning, stacklevel=callers_level())
+        give_warning(msg, FailedCasesWarning)
     return result
 
 
@@ -171,6 +172,8 @@ def _planned(
         raise ParameterError(msg, parameter="function", value=function)
     cases = listed_cases(parameters, paired=paired)
     require_accepted(function, cases)
+    if len(cases) and (inputs is not None or outputs is not None):
+        _require_signals(function, cases.arguments(0), inputs, outputs)
     if parameters is None and frequencies is not None and quantities == ("response",):
         shared = FrequencyWork(function=function, inputs=inputs, outputs=outputs)
         return _Plan(
@@ -186,6 +189,18 @@ def _planned(
         what="cases",
         join=lambda outcomes: joined_cases(outcomes, cases, frequencies),
     )
+
+
+def _require_signals(
+    function: Callable[..., object], first: Mapping[str, object], inputs: Names, outputs: Names
+) -> None:
+    """Refuse names of signals at once that the first system does not have; what else fails is for its case to say."""
+    try:
+        made = function(**first)
+    except (Exception, SystemExit):  # noqa: BLE001  # whatever the user's function raises
+        return
+    if isinstance(made, System):
+        selected(made, inputs, outputs)
 
 
 def _checked_quantities(compute: object) -> tuple[Quantity, ...]:

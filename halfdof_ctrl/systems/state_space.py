@@ -6,7 +6,6 @@ with q = X x + U_0 u + U_1 u' + ... of equation (4). What remains of u', u'', ..
 function improper: it grows with frequency, and no state space has it.
 """
 
-import warnings
 from typing import Literal, TypeAlias
 
 import control
@@ -18,7 +17,7 @@ from halfdof_ctrl.base.errors import (
     ImproperError,
     ParameterError,
     SignalNameError,
-    callers_level,
+    give_warning,
 )
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
@@ -151,7 +150,7 @@ def _in_energy_states(reduction: ExactReduction, states: States) -> control.Stat
             "so that rounding of the entries of K changes it. It is kept as it stands; fewer elements, or the "
             "stiffness in other coordinates, determine it better."
         )
-        warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+        give_warning(msg, CloseDecisionWarning)
     return energy_state_space(modal_form(form) if states == "modal" else form)
 
 

@@ -15,6 +15,7 @@ from halfdof_ctrl.base.names import (
     motion_names,
     motions,
     name_from_label,
+    printable,
     unknown_name_error,
 )
 
@@ -102,3 +103,11 @@ def test_unknown_name_lists_the_known_ones() -> None:
     error = unknown_name_error("w", "input", ["u", "v"])
     assert str(error) == "The model has no input 'w'. Known: u, v."
     assert error.names == ("w",)
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31m", "a\nb", "a\tb", "a\x9bb", "a\u202eb", "a\ud800"])
+def test_names_that_a_terminal_obeys_are_refused(name: str) -> None:
+    """ESC, line ends, and what turns the direction of text; the message shows them as escapes."""
+    with pytest.raises(SignalNameError, match="control characters") as refusal:
+        checked_names([name], 1, "DOFs")
+    assert printable(str(refusal.value)) == str(refusal.value)

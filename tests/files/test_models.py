@@ -311,7 +311,7 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
 def test_names_that_files_do_not_keep_are_refused(tmp_path: Path) -> None:
     """NumPy drops a null character at the end of a text."""
     with pytest.raises(FileFormatError, match="holds a control character"):
-        save_model(mechss([[1.0]], None, [[1.0]], dofs=["y\0"]), tmp_path / "a.npz")
+        save_model(mechss([[1.0]], None, [[1.0]], name="y\0"), tmp_path / "a.npz")
     assert list(tmp_path.iterdir()) == []
 
 

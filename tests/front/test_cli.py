@@ -10,11 +10,12 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 from scipy.sparse import csc_array
 
-from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss
+from halfdof_ctrl import dynamic_stiffness, frequency_response, hydromount, mech2ss, mechss, transmissibility
 from halfdof_ctrl.base.errors import HalfdofError
-from halfdof_ctrl.cli import main
+from halfdof_ctrl.cli import EXAMPLES, main
 from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.files.models import save_model
 from halfdof_ctrl.files.systems import load_system
@@ -26,6 +27,7 @@ from support.fe_models import spring_grid
 COMMAND = [sys.executable, "-c", "from halfdof_ctrl.cli import main; raise SystemExit(main())"]
 ENVIRONMENT = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}
 MOUNT = hydromount().select("F_y", ["y", "y_dot"])
+SAME = 1e-12  #: relative difference of numbers that went through a table and another grid
 
 
 @pytest.fixture(autouse=True)
@@ -283,7 +285,6 @@ def test_what_is_refused_gets_one_line_and_exit_code_two(
 @pytest.mark.parametrize(
     "line",
     [
-        "",
         "nonsense hydromount",
         "bode",
         "bode hydromount",
@@ -448,3 +449,65 @@ def test_an_interrupted_bode_diagram_writes_what_is_done(
     assert main([*command, "-o", "part.csv"]) == 130
     assert len(table("part.csv")) == 4
     assert "warning: Interrupted after 3 of 200 frequencies" in capsys.readouterr().err
+
+
+def numbers(path: str) -> np.ndarray:
+    """Read a table without its header."""
+    return np.loadtxt(path, delimiter=",", skiprows=1)
+
+
+def test_the_bare_command_prints_help(capsys: pytest.CaptureFixture[str]) -> None:
+    """With every command."""
+    assert main([]) == 0
+    printed = capsys.readouterr().out
+    assert all(command in printed for command in EXAMPLES)
+
+
+@pytest.mark.parametrize("command", list(EXAMPLES))
+def test_each_help_has_an_example_that_runs(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """And the names of the parameters of built-in models."""
+    with pytest.raises(SystemExit):
+        main([command, "--help"])
+    printed = " ".join(capsys.readouterr().out.split())
+    assert f"Example: halfdof-ctrl {command} {EXAMPLES[command]}" in printed
+    assert "m, K_r, K_rs, K_v, K_s, C_rs, C_h" in printed
+    assert main([command, *EXAMPLES[command].split()]) == 0
+
+
+def test_limits_may_be_given_in_hz(capsys: pytest.CaptureFixture[str]) -> None:
+    """The second column of a table; the same limit in both units is refused."""
+    command = ["bode", "hydromount", "--f-min", "0.5", "--f-max", "8", "--points", "5", "-o", "a.csv"]
+    assert main(command) == 0
+    assert_allclose(numbers("a.csv")[:, 1], [0.5, 1.0, 2.0, 4.0, 8.0], rtol=SAME)
+    assert main([*command, "--omega-max", "9"]) == 2
+    assert "--omega-max and --f-max are the same limit" in capsys.readouterr().err
+
+
+def test_stiffness_of_the_built_in_model_is_that_of_the_mount_alone() -> None:
+    """As on a test rig, unless a mass is asked for."""
+    grid = ["--f-max", "20", "--f-min", "1", "--points", "3"]
+    assert main(["stiffness", "hydromount", *grid, "-o", "a.csv"]) == 0
+    s = 2j * np.pi * numbers("a.csv")[:, 1]
+    assert_allclose(numbers("a.csv")[:, 4], np.abs(dynamic_stiffness(hydromount(m=0), "y", s)), rtol=SAME)
+    assert main(["stiffness", "hydromount", "-p", "m=20", *grid, "-o", "b.csv"]) == 0
+    assert_allclose(numbers("b.csv")[:, 4], np.abs(dynamic_stiffness(hydromount(m=20), "y", s)), rtol=SAME)
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_transmissibility_numbers_are_those_of_transmissibility(*, force: bool) -> None:
+    """Of motion, and of force."""
+    command = ["transmissibility", "hydromount", "--from", "y", "--to", "y2", "--points", "3", *["--force"] * force]
+    assert main([*command, "-o", "a.csv"]) == 0
+    s = 2j * np.pi * numbers("a.csv")[:, 1]
+    exact = transmissibility(hydromount(), "y", "y2", s, kind="force" if force else "motion")
+    assert_allclose(numbers("a.csv")[:, 4], np.abs(exact), rtol=SAME)
+    assert main([*command, "--db", "-o", "a.svg"]) == 0
+
+
+@pytest.mark.parametrize("target", ["a.csv", "a.png"])
+def test_a_response_beyond_the_largest_number_is_refused(target: str, capsys: pytest.CaptureFixture[str]) -> None:
+    """An unstable model, looked at for too long; nothing is written."""
+    save_model(mechss([[1.0]], [[-1.0]], [[1.0]]), "unstable.npz")
+    assert main(["step", "unstable.npz", "--time", "1e6", "-o", target]) == 2
+    assert "beyond the largest number" in capsys.readouterr().err
+    assert not Path(target).exists()

@@ -11,7 +11,7 @@ import pytest
 
 import halfdof_ctrl.report
 from halfdof_ctrl import mechss
-from halfdof_ctrl.base.errors import own_messages, recording_warnings
+from halfdof_ctrl.base.errors import give_warning, own_messages, recording_warnings
 from halfdof_ctrl.cli import main
 from halfdof_ctrl.errors import HalfdofWarning, LostDigitsWarning, NearlyMasslessWarning
 from halfdof_ctrl.files.models import save_model
@@ -76,14 +76,16 @@ def test_a_spring_without_mass_is_reported_without_a_word_on_stderr(tmp_path: Pa
 
 def test_own_warnings_are_recorded_each_time_and_told_once() -> None:
     """Also where the same place warned before; what filters make of other packages' warnings stays as it is."""
+    filters = list(warnings.filters)
     with recording_warnings() as caught:
+        assert warnings.filters == filters
         for _ in range(2):
-            raised_in("halfdof_ctrl.cli", LostDigitsWarning)()
+            give_warning("few digits", LostDigitsWarning)
         with pytest.raises(RuntimeWarning, match=FOREIGN):
             raised_in("control.statesp", RuntimeWarning)()
         raised_in("control.statesp", DeprecationWarning)()
     assert [warning.category for warning in caught] == [LostDigitsWarning] * 2
-    assert own_messages(caught) == ["LostDigitsWarning by halfdof_ctrl.cli"]
+    assert own_messages(caught) == ["few digits"]
 
 
 def test_every_warning_of_the_package_has_its_base_class() -> None:

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl import hydromount
-from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl import hydromount, sweep
+from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError
 from halfdof_ctrl.sweeps.cases import Parameters, in_words, listed_cases, require_accepted
 
 LISTS = st.dictionaries(
@@ -135,3 +135,36 @@ def test_a_function_that_does_not_tell_its_arguments_is_trusted() -> None:
 def test_parameters_in_words() -> None:
     """Numbers have four digits."""
     assert in_words({"C_h": 1 / 3, "n": 123456, "kind": "soft"}) == "C_h = 0.3333, n = 123456, kind = soft"
+
+
+class UnreadableError(Exception):
+    """An exception whose words cannot be read."""
+
+    def __str__(self) -> str:
+        """Fail."""
+        msg = "no words"
+        raise RuntimeError(msg)
+
+
+def unreadable_at_two(x: float) -> float:
+    """Fail at x = 2."""
+    if x == 2.0:
+        raise UnreadableError
+    return x
+
+
+@pytest.mark.parametrize("workers", [None, 2])
+def test_an_exception_without_words_loses_one_case(workers: int | None) -> None:
+    """Its own, of three."""
+    with pytest.warns(FailedCasesWarning):
+        result = sweep(unreadable_at_two, {"x": [1.0, 2.0, 3.0]}, workers=workers, progress=False)
+    (failure,) = result.failures
+    assert "UnreadableError: its words cannot be read" in str(failure)
+    assert_array_equal(np.asarray(result.values), [1.0, np.nan, 3.0])
+
+
+@pytest.mark.parametrize("names", [{"inputs": "nope"}, {"outputs": ["nope"]}])
+def test_an_unknown_signal_is_refused_before_the_sweep(names: dict[str, Any]) -> None:
+    """By the system of the first case."""
+    with pytest.raises(SignalNameError, match="nope"):
+        sweep(hydromount, {"C_h": [100.0, 300.0]}, omega=[1.0], **names)

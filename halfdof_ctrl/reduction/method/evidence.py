@@ -1,6 +1,5 @@
 """What a method gives as evidence: its decisions about ranks, and the warnings that follow from them."""
 
-import warnings
 from dataclasses import dataclass
 from typing import Literal
 
@@ -8,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import CloseDecisionWarning, LostDigitsWarning, NearlyMasslessWarning, callers_level
+from halfdof_ctrl.base.errors import CloseDecisionWarning, LostDigitsWarning, NearlyMasslessWarning, give_warning
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.reduction.algebra.blocks import BlockSplit
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss
@@ -109,7 +108,7 @@ def _warn_of_another_model(tol: float | None) -> None:
         f"With tol={tol:g} singular values count as zero on which the spectrum depends: the state space is not "
         "that of this model but of one that differs by as much. Pass a smaller tol, unless that is what you mean."
     )
-    warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    give_warning(msg, CloseDecisionWarning)
 
 
 def _warn_of_hardly_regular(rcond: float) -> None:
@@ -117,7 +116,7 @@ def _warn_of_hardly_regular(rcond: float) -> None:
         f"The leading matrix W is regular, but hardly (rcond {rcond:.1e}): the number of states rests on "
         "its smallest singular value. Look for entries that nearly cancel and DOFs with hardly any mass or damping."
     )
-    warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+    give_warning(msg, CloseDecisionWarning)
 
 
 def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
@@ -128,7 +127,7 @@ def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
             f"transfer function, at {loss.omega:.3g} rad/s: the equations for the highest derivatives are ill "
             f"conditioned (reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
         )
-        warnings.warn(msg, LostDigitsWarning, stacklevel=callers_level())
+        give_warning(msg, LostDigitsWarning)
 
 
 def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
@@ -142,7 +141,7 @@ def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
                 f"{values[rank - 1]:.1e} counts and {zero}. It concerns DOFs {listed(decision.dofs)}: look for entries "
                 "that nearly cancel, or pass tol."
             )
-            warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+            give_warning(msg, CloseDecisionWarning)
         elif decision.is_doubtful:
             msg = (
                 f"A block of {decision.matrix} counts as rank {rank}: its next singular value, {values[rank]:.1e} of "
@@ -150,7 +149,7 @@ def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
                 f"It concerns DOFs {listed(decision.dofs)}: the numbers as they are stored have one state or two more, "
                 "very fast ones. Pass tol to say what counts as zero, or mend entries that should cancel."
             )
-            warnings.warn(msg, CloseDecisionWarning, stacklevel=callers_level())
+            give_warning(msg, CloseDecisionWarning)
 
 
 def _warn_of_light_masses(light: LightMasses) -> None:
@@ -159,4 +158,4 @@ def _warn_of_light_masses(light: LightMasses) -> None:
         "zero: their two states are far faster than the others and cost digits. If they are meant to be "
         f"massless, set their mass to zero or pass tol={2.0 * light.ratio:.0e}."
     )
-    warnings.warn(msg, NearlyMasslessWarning, stacklevel=callers_level())
+    give_warning(msg, NearlyMasslessWarning)

@@ -14,7 +14,6 @@ P(s) of the full model at frequencies of the band.
 Derivation: docs/explanation/truncation.md.
 """
 
-import warnings
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,7 +26,7 @@ from halfdof_ctrl.base.errors import (
     MatrixError,
     ParameterError,
     TruncationWarning,
-    callers_level,
+    give_warning,
 )
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
@@ -251,7 +250,7 @@ def _measured(
     if truncated.max_error > ALLOWED_ERROR or shift > ALLOWED_SHIFT or height > ALLOWED_ERROR:
         said = " ".join(_error_in_words(truncated).split())
         msg = f"The small model is not close to the full one: {said}. Raise f_max or n_modes."
-        warnings.warn(msg, TruncationWarning, stacklevel=callers_level())
+        give_warning(msg, TruncationWarning)
     return truncated
 
 

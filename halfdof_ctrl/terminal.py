@@ -1,0 +1,116 @@
+"""What the command does with its streams and signals, so that nothing but what was asked for is on stdout."""
+
+import ctypes
+import errno
+import io
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from types import FrameType
+
+from halfdof_ctrl.base.names import printable
+
+STDOUT, STDERR = 1, 2  #: file descriptors
+
+
+class TerminatedError(BaseException):
+    """The process is asked to end by SIGTERM: what is half-written is taken away on the way out."""
+
+
+class _Printable(io.TextIOWrapper):
+    """A stream on which names cannot steer the terminal."""
+
+    def write(self, text: str) -> int:
+        """Write text with control characters as escapes."""
+        super().write(printable(text))
+        return len(text)
+
+
+class _Closed(io.TextIOBase):
+    """A stream that was closed before the program began."""
+
+    def write(self, text: str) -> int:
+        """Refuse."""
+        raise OSError(errno.EBADF, f"it is closed, so that {len(text)} characters are lost", "standard output")
+
+
+@contextmanager
+def asked_output_only() -> Iterator[None]:
+    """Print on stdout what Python prints, and on stderr what compiled libraries do: BLAS says its errors on stdout."""
+    if sys.stdout is None:  # closed by the shell; its number would be given to the next file that is opened
+        with suppress(OSError):
+            os.open(os.devnull, os.O_RDWR)
+        sys.stdout = _Closed()
+        yield
+        return
+    before = sys.__stdout__
+    if before is None or sys.stdout is not before or not _is_descriptor(before, STDOUT):  # the caller's own stream
+        yield
+        return
+    before.flush()
+    kept = os.dup(STDOUT)
+    try:
+        os.dup2(STDERR, STDOUT)
+    except OSError:  # stderr is closed
+        os.dup2(os.open(os.devnull, os.O_WRONLY), STDOUT)
+    stream = _Printable(
+        os.fdopen(kept, "wb"),
+        encoding=before.encoding,
+        errors="backslashreplace",  # a name that the terminal cannot show is no reason to stop
+        line_buffering=os.isatty(kept),
+    )
+    sys.stdout = stream
+    try:
+        yield
+        stream.flush()
+    except OSError as failure:
+        if failure.filename is None and failure.errno is not None and failure.errno != errno.EPIPE:
+            raise OSError(failure.errno, failure.strerror, "standard output") from failure
+        raise
+    finally:
+        _flush_compiled()
+        sys.stdout = before
+        with suppress(OSError):
+            os.dup2(kept, STDOUT)
+        with suppress(OSError):
+            stream.close()
+
+
+@contextmanager
+def orderly_end() -> Iterator[None]:
+    """Let SIGTERM end the command as Ctrl-C does, and give Ctrl-C back what the start of the program took."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    before = signal.getsignal(signal.SIGTERM)
+    if before is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, _terminate)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def _terminate(number: int, frame: FrameType | None) -> None:
+    raise TerminatedError(number, frame is None)
+
+
+def _is_descriptor(stream: io.TextIOBase | object, number: int) -> bool:
+    try:
+        return isinstance(stream, io.TextIOWrapper) and stream.fileno() == number
+    except (OSError, ValueError):
+        return False
+
+
+def _flush_compiled() -> None:
+    """Let compiled libraries write out what they printed, while it still goes to stderr."""
+    if os.name == "posix":
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(None).fflush(None)
