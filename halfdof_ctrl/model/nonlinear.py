@@ -186,7 +186,7 @@ class NonlinearModel:
         Returns
         -------
         Equilibrium
-            `.state` and `.inputs` for `tangent` and `control.linearize`, `.displacement` by DOF.
+            ``state`` and ``inputs`` for `tangent` and `control.linearize`, ``displacement`` by DOF.
 
         Raises
         ------
