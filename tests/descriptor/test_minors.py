@@ -38,12 +38,13 @@ def test_zeros_of_any_shape_are_those_of_the_minors(seed: int, rows: int, column
     parts = [np.asarray(left @ part @ right, dtype=float) for part in middle]
     divisor = divisor_of_minors(parts)
     found = invariant_zeros(parts)
-    assert found.values.size == divisor.degree()
-    assert not found.doubts
     numerator: Any = flint.fmpz_poly([int(c) for c in divisor.numer().coeffs()])
     roots = numerator.complex_roots() if divisor.degree() > 0 else []
     simple = [complex(root) for root, times in roots if times == 1]
-    assume(simple)
+    if len(simple) == len(roots):
+        assert not found.doubts
+    assert found.values.size == divisor.degree() or found.doubts  # how rounding splits multiple ones, no kernel shares
+    assume(simple and not found.doubts)
     for root in simple:
         assert np.abs(found.values - root).min() <= SCATTER * max(1.0, abs(root))
 
