@@ -35,18 +35,19 @@ class DataLimit:
 
 def refined(
     exact: ExactPolynomial,
-    s: complex,
+    s: complex | ComplexArray,
     solution: ComplexArray,
     right: ComplexArray,
     solve: Callable[[ComplexArray], ComplexArray],
 ) -> ComplexArray:
-    """Refine until corrections no longer shrink.
+    """Refine each column until its corrections no longer shrink.
 
     Parameters
     ----------
     exact : ExactPolynomial
         P(s).
-    s : complex
+    s : complex or (m,) complex ndarray
+        One point for all columns, or one for each.
     solution : (n, m) complex ndarray
         A first one.
     right : (n, m) complex ndarray
@@ -56,19 +57,17 @@ def refined(
     Returns
     -------
     (n, m) complex ndarray
-        The first solution where corrections do not shrink.
+        The first solution where corrections do not shrink, or are larger than itself: more wrong than right.
     """
-    best, last = solution, np.inf
+    best, last = solution.copy(), np.ones(solution.shape[1]) / SHRINKS
     for _ in range(REFINEMENT_ROUNDS):
         correction = solve(exact.residual(s, best, right))
         size = np.abs(best).max(axis=0, initial=0.0)
-        share = float((np.abs(correction).max(axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)).max(initial=0.0))
-        if not share <= SHRINKS * last or not np.isfinite(share):
-            break
-        if share > 1.0:  # more wrong than right: another start is not worth more
-            return solution
-        best, last = best + correction, share
-        if share <= REFINED_ENOUGH:
+        share = np.abs(correction).max(axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)
+        better = share <= SHRINKS * last
+        best[:, better] += correction[:, better]
+        last = np.where(better & (share > REFINED_ENOUGH), share, 0.0)
+        if not last.any():
             break
     return best
 

@@ -137,12 +137,13 @@ def frequency_response(
     >>> frequency_response(lag, [0.0]).complex.tolist()
     [(0.5+0j)]
     """
-    model = sysdata if isinstance(sysdata, SecondOrderModel) else None
+    reduction, model = None, None
     if isinstance(sysdata, SecondOrderModel):
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega)
         try:
-            sys = mech2ss(sysdata)
+            reduction = exact_reduction(sysdata)
+            sys, model = mech2ss(reduction), sysdata
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
     else:
@@ -155,7 +156,7 @@ def frequency_response(
     if sys.isdtime(strict=True):
         points = np.exp(points * float(sys.dt))
     dofs = StateSpaceData.of(sys)
-    values = state_space_response(*dofs, points) if model is None else response_of_model(model, dofs, points)
+    values = state_space_response(*dofs, points) if reduction is None else response_of_model(reduction, dofs, points)
     data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
     return with_source(data, source_of(sys if model is None else model) or source_of(sys))
 

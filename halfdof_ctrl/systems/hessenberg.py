@@ -15,23 +15,41 @@ first order the relative error of a response H = c x is below
     eps |A| |x| |y| / |H|,    (s I - A)^T y = c,    |y| about |x| |c| / |b|,
 
 the last by reciprocity. Where that is much, H is corrected once by the adjoint solution y on the residual in the
-original coordinates, c x + y^T (b - (s I - A) x), whose error is the product of the errors of x and y. Where the
-bound exceeds one (at the far end of a long chain) a sparse factorization of s I - A itself keeps the digits.
+original coordinates, c x + y^T (b - (s I - A) x). What is left is the product of the errors of x and y, and what
+rounding does to the residual, entry by entry below
+
+    eps |y|^T (|s| |x| + |A| |x| + |b|);
+
+the rows of the residual are rounded by themselves, so that three times the root of the sum of squares does for many.
+
+Where the first bound exceeds one (at the far end of a long chain) a sparse factorization of s I - A itself keeps the
+digits.
 """
+
+from contextlib import nullcontext
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
-SUBSTITUTION_BLOCK = 12  #: states whose substitution is done before the rest is updated by one matrix product
+OUTER_BLOCK = 24  #: states whose substitution is done before the rest is updated by one matrix product
+INNER_BLOCK = 4  #: states within that, before the rest of the block is updated by another
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
+FEW_STATES = 60  #: up to which products are cut so that each runs on one thread; above, threads are limited
+ONE_THREAD = 2**18  #: multiplications of a product up to which OpenBLAS takes one thread
+SAFE_GROWTH = 2.0**125  #: growth from one state to the next up to which it is enough to look once an inner block
 ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
 UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
 RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
+WORST_POINTS = 16  #: corrected points with the largest bounds, at which rounding of the residual is bounded ...
+INDEPENDENT = 3.0  #: times the root of the sum of squares, which a sum of independent rounding errors hardly exceeds
+OTHER_POINTS = 16  #: ... and as many others, spread over all
 
 
 def state_space_response(
@@ -51,68 +69,131 @@ def state_space_response(
     (p, m, k) complex ndarray
         ``inf + nan j`` at a pole.
     """
+    return bounded_response(A, B, C, D, points).values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundedResponse:
+    """Values of a state space with p outputs and m inputs at k points, and what rounding may have done to them."""
+
+    values: ComplexArray  #: (p, m, k), ``inf + nan j`` at a pole
+    bound: float  #: of their relative errors, the largest found; infinite where it was not looked for
+
+
+def bounded_response(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, points: ComplexArray
+) -> BoundedResponse:
+    """Evaluate ``C (s I - A)^-1 B + D``, with a bound of the error that evaluation adds.
+
+    Parameters
+    ----------
+    A, B, C, D, points
+        As of `state_space_response`.
+
+    Examples
+    --------
+    >>> one = np.eye(1)
+    >>> lag = bounded_response(-one, one, one, 0.0 * one, np.array([1j]))
+    >>> lag.values.ravel().tolist(), lag.bound < 1e-12
+    ([(0.5-0.5j)], True)
+    """
     values = np.empty((*D.shape, points.size), dtype=np.complex128)
     values[:] = D[:, :, None]
     if A.shape[0] == 0:
-        return values
+        return BoundedResponse(values, 0.0)
     matrix, scale = balanced_states(A)
     balanced = np.asarray(matrix, dtype=np.float64)
     inputs, outputs = np.asarray(B / scale[:, None]), np.asarray(C * scale)
-    batch = max(1, POINT_ENTRIES // A.shape[0])
-    if B.shape[1] <= C.shape[0]:
-        _add_channels(values, balanced, inputs, outputs, points, batch)
-    else:
-        _add_channels(np.swapaxes(values, 0, 1), balanced.T, outputs.T, inputs.T, points, batch)
+    with limited_threads(1) if len(A) > FEW_STATES else nullcontext():  # threads would wait for each other
+        if B.shape[1] <= C.shape[0]:
+            bound = _Channels(balanced, inputs, outputs).add_to(values, points)
+        else:
+            bound = _Channels(balanced.T, outputs.T, inputs.T).add_to(np.swapaxes(values, 0, 1), points)
     values[np.isnan(values)] = complex(np.inf, np.nan)
-    return values
+    return BoundedResponse(values, bound)
 
 
-def _add_channels(
-    values: ComplexArray, A: FloatArray, B: FloatArray, C: FloatArray, points: ComplexArray, batch: int
-) -> None:
-    """Add ``C (s I - A)^-1 B`` to values (p, m, k), an input at a time."""
-    adjoints: dict[int, ShiftedSolver] = {}
-    lengths, size = np.linalg.norm(C, axis=1), float(np.linalg.norm(A, 1))
-    for j in range(B.shape[1]):
-        solver = ShiftedSolver(A, B[:, j])
-        rotated = C @ solver.Q
-        for start in range(0, points.size, batch):
-            part = points[start : start + batch]
-            x = solver.solve(part)
-            with np.errstate(invalid="ignore", over="ignore"):
-                response = _real_times_complex(rotated, x)
-                bound = EPS * size * _column_norms(x) ** 2 * lengths[:, None] / abs(solver.beta)
-                small = bound > RISK * np.abs(response)
-                hopeless = bound > np.abs(response)
-            for i in np.flatnonzero(hopeless.any(axis=1)).tolist():
-                response[i, hopeless[i]] = sparse_response(A, B[:, j], C[i], part[hopeless[i]])
-            small &= ~hopeless
-            for i in np.flatnonzero(small.any(axis=1)).tolist():
-                if i not in adjoints:
-                    adjoints[i] = ShiftedSolver(A.T, C[i])
-                response[i, small[i]] = _refined(
-                    response[i, small[i]], (A, B[:, j], C[i]), part[small[i]], (solver, x[:, small[i]]), adjoints[i]
-                )
-            values[:, j, start : start + batch] += response
+class _Channels:
+    """``C (s I - A)^-1 B`` with the solvers of its inputs and, where they are needed, of its outputs."""
+
+    def __init__(self, A: FloatArray, B: FloatArray, C: FloatArray) -> None:
+        self.A, self.B, self.C = A, B, C
+        self.adjoints: dict[int, ShiftedSolver] = {}
+        self.lengths, self.size = np.linalg.norm(C, axis=1), float(np.linalg.norm(A, 1))
+        self.bound = 0.0
+
+    def add_to(self, values: ComplexArray, points: ComplexArray) -> float:
+        """Add it to values (p, m, k), an input at a time; return the largest bound of a relative error."""
+        batch = max(1, POINT_ENTRIES // len(self.A))
+        for j in range(self.B.shape[1]):
+            solver = ShiftedSolver(self.A, self.B[:, j])
+            rotated = self.C @ solver.Q
+            for start in range(0, points.size, batch):
+                part = slice(start, start + batch)
+                values[:, j, part] += self._responses(j, solver, rotated, points[part])
+        return self.bound
+
+    def _responses(self, j: int, solver: "ShiftedSolver", rotated: FloatArray, points: ComplexArray) -> ComplexArray:
+        """Return the response to one input, corrected where its bound says so."""
+        x = solver.solve(points)
+        with np.errstate(invalid="ignore", over="ignore"):
+            response = _real_times_complex(rotated, x)
+            size = np.abs(response)
+            bound = EPS * self.size * _column_norms(x) ** 2 * self.lengths[:, None] / abs(solver.beta)
+            small, hopeless = bound > RISK * size, bound > size
+        if not small.any():
+            self.bound = max(self.bound, RISK)
+            return response
+        for i in np.flatnonzero(hopeless.any(axis=1)).tolist():
+            response[i, hopeless[i]] = sparse_response(self.A, self.B[:, j], self.C[i], points[hopeless[i]])
+            self.bound = np.inf
+        small &= ~hopeless
+        for i in np.flatnonzero(small.any(axis=1)).tolist():
+            at = small[i]
+            risk = bound[i, at] / size[i, at]
+            response[i, at] = self._corrected(response[i, at], (i, j), points[at], (solver, x[:, at]), risk)
+        return response
+
+    def _corrected(
+        self,
+        response: ComplexArray,
+        channel: tuple[int, int],
+        points: ComplexArray,
+        solution: tuple["ShiftedSolver", ComplexArray],
+        risk: FloatArray,
+    ) -> ComplexArray:
+        """Add ``y^T (b - (s I - A) x)`` to the response ``c x``, or solve again where that is not small."""
+        (i, j), (solver, x) = channel, solution
+        b, c = self.B[:, j], self.C[i]
+        if i not in self.adjoints:
+            self.adjoints[i] = ShiftedSolver(self.A.T, c)
+        adjoint = self.adjoints[i]
+        state = _real_times_complex(solver.Q, x)
+        residual = b[:, None] - points * state + _real_times_complex(self.A, state)
+        y = _real_times_complex(adjoint.Q, adjoint.solve(points))
+        correction = (y * residual).sum(axis=0)
+        refined = np.asarray(response + correction)
+        unsafe = np.abs(correction) > UNSAFE_CORRECTION * np.abs(refined)
+        if unsafe.any():
+            refined[unsafe] = sparse_response(self.A, b, c, points[unsafe])
+            self.bound = np.inf
+        if self.bound < np.inf:
+            looked_at = _looked_at(risk)
+            x_size, y_size = np.abs(state[:, looked_at]), np.abs(y[:, looked_at])
+            terms = np.abs(points[looked_at]) * x_size + np.abs(self.A) @ x_size + np.abs(b)[:, None]
+            shares = EPS * y_size * terms
+            rounding = np.minimum(shares.sum(axis=0), INDEPENDENT * np.linalg.norm(shares, axis=0))
+            left = (rounding + np.abs(correction[looked_at]) * UNSAFE_CORRECTION) / np.abs(refined[looked_at])
+            self.bound = max(self.bound, float(left.max()))
+        return refined
 
 
-def _refined(
-    response: ComplexArray,
-    system: tuple[FloatArray, FloatArray, FloatArray],
-    points: ComplexArray,
-    solution: tuple["ShiftedSolver", ComplexArray],
-    adjoint: "ShiftedSolver",
-) -> ComplexArray:
-    """Add ``y^T (b - (s I - A) x)`` to the response ``c x``, or solve again where that is not small."""
-    (A, b, c), (solver, x) = system, solution
-    state = _real_times_complex(solver.Q, x)
-    residual = b[:, None] - points * state + _real_times_complex(A, state)
-    correction = (_real_times_complex(adjoint.Q, adjoint.solve(points)) * residual).sum(axis=0)
-    refined = np.asarray(response + correction)
-    unsafe = np.abs(correction) > UNSAFE_CORRECTION * np.abs(refined)
-    if unsafe.any():
-        refined[unsafe] = sparse_response(A, b, c, points[unsafe])
-    return refined
+def _looked_at(risk: FloatArray) -> IndexArray:
+    """Return the places of the largest risks, and of others spread over all."""
+    if risk.size <= WORST_POINTS + OTHER_POINTS:
+        return np.arange(risk.size)
+    spread = np.linspace(0, risk.size - 1, OTHER_POINTS).astype(np.intp)
+    return np.unique(np.concatenate([np.argpartition(-risk, WORST_POINTS)[:WORST_POINTS], spread]))
 
 
 class ShiftedSolver:
@@ -124,35 +205,52 @@ class ShiftedSolver:
         below = np.abs(np.diagonal(H, -1))
         stops = np.flatnonzero(below <= ZERO_SUBDIAGONAL * np.abs(H).max())
         reached = int(stops[0]) + 1 if stops.size else H.shape[0]
-        self.H = np.ascontiguousarray(H[:reached, :reached])  #: the part of H that b reaches
+        self.H: FloatArray = np.ascontiguousarray(H[:reached, :reached], dtype=np.float64)  #: the part that b reaches
         self.Q = (Q - np.outer(mirror, mirror @ Q))[:, :reached]  #: (N, reached) its orthonormal basis
 
     def solve(self, points: ComplexArray) -> ComplexArray:
         """Return x, (reached, k), in the coordinates of Q."""
-        H = self.H
-        n, k = H.shape[0], points.size
+        n, k = self.H.shape[0], points.size
         x = np.empty((n, k), dtype=np.complex128)
         x[n - 1] = 1.0
-        real = x.view(np.float64)
-        length = np.empty(k, dtype=np.complex128)
-        scratch = np.empty((SUBSTITUTION_BLOCK, 2 * k))
-        for stop in range(n, 0, -SUBSTITUTION_BLOCK):
-            first = max(0, stop - SUBSTITUTION_BLOCK)
-            sums = H[first:stop, stop - 1 :] @ real[stop - 1 :]  # row i: sum of h_ij x_j over the known j
-            for i in range(stop - 1, first - 1, -1):
-                row = points * x[i]
-                row -= sums[i - first].view(np.complex128)
-                if i == 0:
-                    length = row
-                    break
-                np.multiply(row, 1.0 / H[i, i - 1], out=x[i - 1])
-                if max(real[i - 1].max(), -real[i - 1].min()) > HUGE:
-                    _scale_down(x[i - 1 :], sums.view(np.complex128))
-                if i > first:
-                    sums[: i - first] += np.multiply(H[first:i, i - 1 : i], real[i - 1], out=scratch[: i - first])
+        length = points * x[0] - self.H[0, 0] if n == 1 else self._substituted(x, points)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             x *= self.beta / length
         return x
+
+    def _substituted(self, x: ComplexArray, points: ComplexArray) -> ComplexArray:
+        """Fill x from its last row upwards, and return row 1 of (s I - H) x."""
+        H, n, real = self.H, len(x), x.view(np.float64)
+        inner = INNER_BLOCK if self._growth(points) < SAFE_GROWTH else 1
+        row = np.empty(x.shape[1], dtype=np.complex128)
+        scratch = np.empty((inner, real.shape[1]))
+        for stop in range(n, 0, -OUTER_BLOCK):
+            first = max(0, stop - OUTER_BLOCK)
+            sums = _product(H[first:stop, stop - 1 :], real[stop - 1 :])  # row i: sum of h_ij x_j over the known j
+            for end in range(stop, first, -inner):
+                begin = max(first, end - inner)
+                part = sums[begin - first : end - first]
+                if end < stop:
+                    part += H[begin:end, end - 1 : stop - 1] @ real[end - 1 : stop - 1]
+                for i in range(end - 1, begin - 1, -1):
+                    np.multiply(points, x[i], out=row)
+                    row.view(np.float64)[:] -= part[i - begin]
+                    if i == 0:
+                        return row
+                    np.multiply(row.view(np.float64), 1.0 / H[i, i - 1], out=real[i - 1])
+                    above = i - begin
+                    if above:
+                        part[:above] += np.multiply(H[begin:i, i - 1 : i], real[i - 1], out=scratch[:above])
+                found = real[begin - 1 : end - 1]
+                if max(found.max(), -found.min()) > HUGE:
+                    _scale_down(x[begin - 1 :], end - begin, sums.view(np.complex128))
+        return row
+
+    def _growth(self, points: ComplexArray) -> float:
+        """Bound how much larger a state may be than the largest of those below it."""
+        H = self.H
+        rows = np.abs(points).max(initial=0.0) + np.abs(H[1:]).sum(axis=1)
+        return float((rows / np.abs(np.diagonal(H, -1))).max(initial=0.0))
 
 
 def _reflected(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
@@ -168,11 +266,23 @@ def _reflected(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, fl
     return reflected - np.outer(reflected @ v, v), v, sign * norm
 
 
-def _scale_down(known: ComplexArray, sums: ComplexArray) -> None:
-    """Scale the points whose solution has grown, in all that depends on it."""
-    grown = np.abs(known[0]) > HUGE
+def _scale_down(known: ComplexArray, new: int, sums: ComplexArray) -> None:
+    """Scale the points whose solution has grown in its new rows, in all that depends on it."""
+    rows = known[:new]
+    grown = np.maximum(np.abs(rows.real), np.abs(rows.imag)).max(axis=0) > HUGE
     known[:, grown] *= TINY
     sums[:, grown] *= TINY
+
+
+def _product(matrix: FloatArray, x: FloatArray) -> FloatArray:
+    """Multiply, in pieces so small that none of them starts threads, which takes longer than the work itself."""
+    piece = ONE_THREAD // matrix.size
+    if piece >= x.shape[1] or len(x) > FEW_STATES:
+        return np.asarray(matrix @ x)
+    result = np.empty((len(matrix), x.shape[1]))
+    for start in range(0, x.shape[1], piece):
+        np.matmul(matrix, x[:, start : start + piece], out=result[:, start : start + piece])
+    return result
 
 
 def _real_times_complex(matrix: FloatArray, x: ComplexArray) -> ComplexArray:

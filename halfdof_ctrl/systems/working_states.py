@@ -8,27 +8,30 @@ Models without energy coordinates (unsymmetric or indefinite M or K, constraints
 coordinates) are worked in DOF states, scaled by powers of two.
 """
 
-from functools import partial
-
 import control
 import numpy as np
 import scipy.linalg
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, powers_of_two
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, is_zero, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial
+from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import refined
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.systems.hessenberg import state_space_response
+from halfdof_ctrl.systems.hessenberg import bounded_response, state_space_response
 from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
 from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 AGREEMENT = 1e-12  #: relative difference between two evaluations up to which both are right
-SOUND_RESPONSE = 1e-10  #: relative error at tested points up to which a large model stays with the states it has
+SOUND_BOUND = (
+    5e-10  #: bound of the relative error of an evaluation up to which it is right; it exceeds it some 10 times
+)
+SOUND_STORED = 1e-9  #: the same over rcond(W), which rounding of A and B is enlarged by; it exceeds that some 30 times
+SOUND_RESPONSE = 2e-11  #: relative error at tested points up to which a model stays with the states it has
 FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
 MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
 
@@ -100,35 +103,36 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     return sys if form is None else energy_state_space(form)
 
 
-def response_of_model(model: SecondOrderModel, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
+def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
     """Evaluate a model in the states that keep most digits.
 
-    A model with many states is evaluated in DOF states, and stays there if these are right wherever it is tested by
-    refined solves of the descriptor form; energy coordinates cost more than that.
+    DOF states are kept where a bound of rounding says that they are right, or, with many states, where they are right
+    wherever they are tested by refined solves of the descriptor form; energy coordinates cost more than that.
 
     Parameters
     ----------
-    model : SecondOrderModel
-        Proper, with N states, m inputs and p outputs.
+    reduction : ExactReduction
+        Of a proper model with N states, m inputs and p outputs.
     dofs : StateSpaceData
-        In DOF states.
+        Its state space in DOF states.
     points : (k,) complex ndarray
 
     Returns
     -------
     (p, m, k) complex ndarray
     """
-    order = len(dofs.A)
-    if order > FEW_STATES and not model.is_sparse:
-        values = state_space_response(*dofs, points)
-        if _is_sound(model, values, points):
-            return values
-    form = working_form(model, order)
-    return state_space_response(*dofs, points) if form is None else response_of_form(form, dofs, points)
+    model, evaluated = reduction.model, bounded_response(*dofs, points)
+    values = evaluated.values
+    if evaluated.bound <= min(SOUND_BOUND, SOUND_STORED * reduction.rcond):
+        return values
+    if not model.is_sparse and _is_sound(model, values, points):
+        return values
+    form = working_form(model, reduction.order)
+    return values if form is None else response_of_form(form, values, points)
 
 
-def response_of_form(form: EnergyForm, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
-    """Evaluate a model in energy coordinates and in DOF states, and keep the better where they differ.
+def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArray) -> ComplexArray:
+    """Evaluate a model in energy coordinates, and keep what DOF states gave where that is better.
 
     Which is better tell refined solves of the descriptor form at a few of the points where they differ, and those
     values are taken themselves. A large model stays in energy coordinates if they are right wherever it is tested.
@@ -137,8 +141,8 @@ def response_of_form(form: EnergyForm, dofs: StateSpaceData, points: ComplexArra
     ----------
     form : EnergyForm
         Of a proper model with N states, m inputs and p outputs.
-    dofs : StateSpaceData
-        The same model in DOF states.
+    others : (p, m, k) complex ndarray
+        The same in DOF states.
     points : (k,) complex ndarray
 
     Returns
@@ -149,7 +153,6 @@ def response_of_form(form: EnergyForm, dofs: StateSpaceData, points: ComplexArra
     values = state_space_response(form.A, form.B, output.X, output.direct(form.B.shape[1]), points)
     if len(form.A) > FEW_STATES and _is_sound(form.model, values, points):
         return values
-    others = state_space_response(*dofs, points)
     with np.errstate(invalid="ignore"):
         apart = np.abs(values - others)
         doubt = np.isfinite(apart) & (apart > AGREEMENT * np.abs(others))
@@ -194,30 +197,44 @@ def refined_response(model: SecondOrderModel, points: ComplexArray) -> ComplexAr
     >>> refined_response(mechss([[0]], [[0]], [[4]]), np.array([1j])).ravel().tolist()
     [(0.25+0j)]
     """
-    exact = ExactPolynomial(model.quadratics.P)
-    shape = (len(model.outputs), len(model.inputs), points.size)
-    values = np.full(shape, complex(np.nan, np.nan))
-    for k, s in enumerate(points.tolist()):
-        P = model.K + s * model.C + s**2 * model.M
-        rows = powers_of_two(np.abs(P).max(axis=1))
-        columns = powers_of_two(np.abs(rows[:, None] * P).max(axis=0))
-        factors, pivots, failed = zgetrf(rows[:, None] * P * columns)
-        if failed:
-            continue
-        right = model.B + s * model.Bv + s**2 * model.Ba + 0j
-        solve = partial(_scaled_solve, factors, pivots, rows, columns)
-        motion = refined(exact, s, solve(right), right, solve)
-        outputs = (model.F + s * model.G + s**2 * model.H) @ motion
-        values[:, :, k] = outputs + model.D + s * model.Dv + s**2 * model.Da
-    return values
+    m, coefficients = len(model.inputs), model.quadratics
+    solvers = [_PointSolver(_at(coefficients.P, s)) for s in points.tolist()]
+    right = np.hstack([_at(coefficients.B, s) + 0j for s in points.tolist()])
+
+    def solve(columns: ComplexArray) -> ComplexArray:
+        return np.hstack([solver.solve(columns[:, m * k : m * k + m]) for k, solver in enumerate(solvers)])
+
+    motion = refined(ExactPolynomial(coefficients.P), np.repeat(points, m), solve(right), right, solve)
+    values = [
+        _at(coefficients.F, s) @ motion[:, m * k : m * k + m] + _at(coefficients.D, s)
+        for k, s in enumerate(points.tolist())
+    ]
+    return np.stack(values, axis=2)
 
 
-def _scaled_solve(
-    factors: ComplexArray, pivots: IndexArray, rows: FloatArray, columns: FloatArray, right: ComplexArray
-) -> ComplexArray:
-    """Solve with factors of a matrix whose rows and columns were scaled."""
-    solution, _ = zgetrs(factors, pivots, rows[:, None] * right)
-    return np.asarray(columns[:, None] * solution)
+def _at(coefficients: Coefficients, s: complex) -> FloatArray | ComplexArray:
+    """Evaluate a quadratic matrix polynomial."""
+    constant, linear, quadratic = coefficients
+    value = np.asarray(constant)
+    for power, part in ((s, linear), (s**2, quadratic)):
+        value = value if is_zero(part) else value + power * part
+    return value
+
+
+class _PointSolver:
+    """Factors of P(s), its rows and columns scaled by powers of two."""
+
+    def __init__(self, P: ComplexArray | FloatArray) -> None:
+        self.rows = powers_of_two(np.abs(P).max(axis=1))
+        self.columns = powers_of_two(np.abs(self.rows[:, None] * P).max(axis=0))
+        self.factors, self.pivots, self.failed = zgetrf(self.rows[:, None] * P * self.columns)
+
+    def solve(self, right: ComplexArray) -> ComplexArray:
+        """Return the solution for (n, m) right-hand sides, NaN where P(s) is singular."""
+        if self.failed:
+            return np.full(right.shape, complex(np.nan, np.nan))
+        solution, _ = zgetrs(self.factors, self.pivots, self.rows[:, None] * right)
+        return np.asarray(self.columns[:, None] * solution)
 
 
 def _is_large(model: SecondOrderModel) -> bool:

@@ -6,7 +6,10 @@ from numpy.testing import assert_allclose
 from scipy.sparse import csc_array
 
 from halfdof_ctrl import SecondOrderModel, mechss
+from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.model.evaluation import data_limit, quadratic_transfer, transfer_and_growth
+from halfdof_ctrl.model.refinement import refined
 
 SPRING = 1.0  # N/m
 LINK = 2.0**40  # N/m: a link so stiff that the sum of link and spring loses twelve digits
@@ -60,3 +63,18 @@ def test_data_and_slope_of_an_oscillator_are_those_of_the_formula() -> None:
     desired = np.finfo(float).eps * ((k + w**2 * m) / stiffness**2 + 2.0 / stiffness)
     assert desired / DATA < limit.data[0, 0, 0] < desired * DATA
     assert_allclose(limit.slope, 2.0 * w**2 * m / stiffness**2, rtol=1e-14)
+
+
+def test_columns_are_refined_each_by_itself() -> None:
+    """Two points side by side, P singular to rounding at one of them: the other is refined to the last digit."""
+    exact = ExactPolynomial([np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-30]]), np.eye(2) * 2.0**-60])
+    points, right = np.array([0.0j, 1j]), np.array([[0j, 0j], [1.0 + 0j, 1.0 + 0j]])
+    inverse = np.array([[2.0**30 + 1.0, -(2.0**30)], [-(2.0**30), 2.0**30]])
+    wrong = 1.5e-3 * np.eye(2)
+
+    def solve(residual: ComplexArray) -> ComplexArray:
+        return np.hstack([(inverse + wrong) @ residual[:, :1], 1e9 * residual[:, 1:]])
+
+    found = refined(exact, points, solve(right), right, solve)
+    assert_allclose(found[:, 0], [-(2.0**30), 2.0**30], rtol=1e-15)
+    assert_allclose(found[:, 1], solve(right)[:, 1])
