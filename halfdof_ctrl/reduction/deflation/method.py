@@ -24,11 +24,12 @@ from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, 
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import Loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal, without_rounding
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
 CAUTIONS = (Caution(24.0, 3.0), Caution(6.0, 0.4), Caution(150.0, 30.0))  #: tried in turn
@@ -39,12 +40,10 @@ TRUSTED_ERROR = 1e-8  #: of the response: measured errors above it do not say wh
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class Deflation:
+class Deflation(FromEquations):
     """A reduction by deflation: a `ReductionMethod`."""
 
-    model: SecondOrderModel
     coordinates: StateSelection
-    equations: StateEquations
     rounding: Rounding
     evidence: Evidence  #: `rcond` is the smallest of the square systems (18)
     tol: float | None
@@ -53,26 +52,6 @@ class Deflation:
     def name(self) -> MethodName:
         """`deflation`."""
         return "deflation"
-
-    @property
-    def A(self) -> FloatArray:  # noqa: N802
-        """(N, N) state matrix."""
-        return self.equations.A
-
-    @property
-    def B(self) -> FloatArray:  # noqa: N802
-        """(N, m) input matrix."""
-        return self.equations.B
-
-    @property
-    def shift(self) -> tuple[FloatArray, ...]:
-        """E_0, E_1, ... of equation (5)."""
-        return self.equations.shift
-
-    @property
-    def input_derivatives(self) -> int:
-        """How many derivatives of the inputs the velocities may contain."""
-        return len(self.equations.displacement.U)
 
     def index(self) -> int:
         """Return the index of the pencil (8) from the growth of its inverse.
@@ -88,14 +67,6 @@ class Deflation:
     def output(self, model: SecondOrderModel) -> Signal:
         """Return the outputs of a model that differs in them alone."""
         return output_signal(model, self.equations, lambda: self.rounding)
-
-    def motion(self, derivative: int) -> Signal:
-        """Return a derivative of all DOFs."""
-        return self.equations.motion(derivative)
-
-    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
-        """Return a derivative of all DOFs for given states and inputs."""
-        return self.equations.motion_at(x, inputs, derivative)
 
     def without_rounding(self) -> FloatArray:
         """Return A as it is: what of it is rounding is not followed entry by entry."""

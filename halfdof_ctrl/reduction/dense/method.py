@@ -1,6 +1,5 @@
 """The methods by one dense solve of (3): a selection of DOFs, or orthonormal bases of null spaces."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,10 +17,11 @@ from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, output_signal
+from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal
 
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
@@ -31,34 +31,17 @@ LOSS_LOOKED_AT = 1e-12  #: other coordinates are tried only where that much is l
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
-class SingleSolve:
+class SingleSolve(FromEquations):
     """A reduction by one dense solve of (3): a `ReductionMethod`."""
 
-    model: SecondOrderModel
     coordinates: DofPartition
     leading: LeadingMatrix  #: W of equation (2), factorized
-    equations: StateEquations
     loss: Loss = NOTHING_LOST  #: measured where W asks for it
 
     @property
     def name(self) -> MethodName:
         """`selection` or `orthogonal`."""
         return self.coordinates.method
-
-    @property
-    def A(self) -> FloatArray:  # noqa: N802
-        """(N, N) state matrix."""
-        return self.equations.A
-
-    @property
-    def B(self) -> FloatArray:  # noqa: N802
-        """(N, m) input matrix."""
-        return self.equations.B
-
-    @property
-    def shift(self) -> tuple[FloatArray, ...]:
-        """E_0, E_1 of equation (5)."""
-        return self.equations.shift
 
     @property
     def evidence(self) -> Evidence:
@@ -72,11 +55,6 @@ class SingleSolve:
             hardly=rcond < CLOSE_GAP * n * SINGULAR_RCOND,
         )
 
-    @property
-    def input_derivatives(self) -> int:
-        """How many derivatives of the inputs the velocities may contain."""
-        return len(self.equations.displacement.U)
-
     def index(self) -> int:
         """Return 1 where there are static coordinates, else 0."""
         return int(self.coordinates.n_static > 0)
@@ -84,14 +62,6 @@ class SingleSolve:
     def output(self, model: SecondOrderModel) -> Signal:
         """Return the outputs of a model that differs in them alone."""
         return output_signal(model, self.equations, self._rounding)
-
-    def motion(self, derivative: int) -> Signal:
-        """Return a derivative of all DOFs."""
-        return self.equations.motion(derivative)
-
-    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
-        """Return a derivative of all DOFs for given states and inputs."""
-        return self.equations.motion_at(x, inputs, derivative)
 
     def without_rounding(self) -> FloatArray:
         """Return A with zeros for entries that may be rounding of zero.
@@ -143,11 +113,7 @@ def by_selection(model: SecondOrderModel, tol: float | None, *, asked: bool) -> 
     SingularLeadingMatrixError
         It was asked for, and W is singular to working precision.
     """
-    found = _solved(model, select_columns(model, tol), asked=asked)
-    if found is None:
-        return None
-    settled = asked or tol is not None or found.leading.rcond > SURELY_REGULAR
-    return _chosen(found, tol, asked=asked) if settled or has_spectrum(model, found.A) else None
+    return _proved(model, select_columns(model, tol), tol, asked=asked, proof_above=SURELY_REGULAR)
 
 
 def by_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SingleSolve | None:
@@ -160,10 +126,17 @@ def by_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) -> Sing
     SingularLeadingMatrixError
         They were asked for, and W is singular to working precision.
     """
-    found = _solved(model, orthonormal_bases(model, tol), asked=asked)
+    return _proved(model, orthonormal_bases(model, tol), tol, asked=asked, proof_above=np.inf)
+
+
+def _proved(
+    model: SecondOrderModel, coordinates: DofPartition, tol: float | None, *, asked: bool, proof_above: float
+) -> SingleSolve | None:
+    """Solve (3) and prove it, by equation (19) unless rcond(W) is above a limit; None if either fails."""
+    found = _solved(model, coordinates, asked=asked)
     if found is None:
         return None
-    settled = asked or tol is not None
+    settled = asked or tol is not None or found.leading.rcond > proof_above
     return _chosen(found, tol, asked=asked) if settled or has_spectrum(model, found.A) else None
 
 

@@ -147,19 +147,14 @@ def has_spectrum(model: SecondOrderModel, A: FloatArray) -> bool:
     return pencil.has_spectrum(balanced(np.asarray(A / units.time)))
 
 
-def loss(model: SecondOrderModel, equations: StateEquations) -> float:
-    """Measure what state equations, by whatever method, lose against direct solves."""
-    pencil, scaled = _in_scaled_units(model, equations)
-    return pencil.losses(scaled).worst
-
-
 def expected_loss(model: SecondOrderModel, equations: StateEquations) -> float:
     """Bound what state equations, by whatever method, lose by being rounded."""
-    pencil, scaled = _in_scaled_units(model, equations)
+    pencil, scaled = in_scaled_units(model, equations)
     return pencil.expected_loss(scaled)
 
 
-def _in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
+def in_scaled_units(model: SecondOrderModel, equations: StateEquations) -> tuple[ScaledPencil, StateEquations]:
+    """Return the pencil to be proved against, and the state equations in its units."""
     _, units, pencil = scaled_pencil(model)
     q, across = equations.displacement, units.inputs / units.columns[:, None]
     scaled = StateEquations(

@@ -15,7 +15,7 @@ from halfdof_ctrl.reduction.deflation import method
 from halfdof_ctrl.reduction.deflation.method import CAUTIONS, deflated
 from halfdof_ctrl.reduction.deflation.row_system import Caution
 from halfdof_ctrl.reduction.deflation.states import StateSelection
-from halfdof_ctrl.reduction.method.proof import has_spectrum, loss
+from halfdof_ctrl.reduction.method.proof import has_spectrum, in_scaled_units
 from halfdof_ctrl.reduction.method.signals import StateEquations
 from support.mechanisms import JERK, SNAP, blade, derivatives, hanging_chain, in_units, rod
 from support.row_systems import POINTS, dense, response
@@ -25,6 +25,12 @@ ROUNDOFF = 1e-12  # small well-conditioned models
 UNITS = 1e-9  # the model in other units is rounded once more, in every entry, and A multiplies by itself
 ABSURD = Caution(1e30, 1e30)  # takes everything for rounding
 POWERS = st.lists(st.integers(-9, 9), min_size=13, max_size=13)
+
+
+def loss(model: SecondOrderModel, equations: StateEquations) -> float:
+    """Return what state equations lose against direct solves, of the outputs."""
+    pencil, scaled = in_scaled_units(model, equations)
+    return pencil.losses(scaled).worst
 
 
 def test_selection_tells_states_and_kinds_by_name() -> None:
