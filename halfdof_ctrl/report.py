@@ -29,6 +29,7 @@ from halfdof_ctrl.files.containers import PathLike
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.writing import naming_target
 from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.page import PAGE_MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
@@ -93,7 +94,11 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     ...     write_report(hydromount().select("F_y", "y"), f"{parent}/report").passed
     True
     """
-    model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
+    model = dense_copy(
+        checked_model(model, "write_report"),
+        "write_report",
+        "Report a reduced model: write_report(truncate_modes(...), folder).",
+    )
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
     with recording_warnings() as caught:

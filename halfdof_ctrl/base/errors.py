@@ -73,6 +73,10 @@ class ParameterError(HalfdofError):
         self.value = value
 
 
+class WrongObjectError(ParameterError, TypeError):
+    """An argument is another kind of object than the function takes; `parameter` and `value` say which."""
+
+
 class SingularLeadingMatrixError(NoStateSpaceError):
     """The leading matrix W of equation (2) is singular.
 

@@ -5,10 +5,13 @@ For a DOF ``y`` the package knows the force ``F_y``, the displacement, velocity 
 labels, which finite-element labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
 """
 
+import difflib
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Literal, TypeAlias
+
+import numpy as np
 
 from halfdof_ctrl.base.errors import SignalNameError
 
@@ -22,6 +25,8 @@ SIGNAL_WORDS = {
     "output": ("y", "a DOF's motion", "F, G, H"),
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
 UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  #: categories of Unicode that a terminal or a table obeys instead of showing
+LARGEST_NUMBER = 10**18  #: node numbers of all programs are smaller
+CLOSE = 0.6  #: likeness from which a name is offered in place of an unknown one, as difflib has it
 MOST_CACHED = 1000  #: names of larger models are made anew each time, since a cache would hold on to them
 
 
@@ -121,10 +126,7 @@ def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[st
         Wrong count, entries that are not text, or duplicates, which python-control would merge
         silently into one signal.
     """
-    if isinstance(given, set | frozenset):
-        msg = f"Names of {what} were given as a set, which has no order. Give a list."
-        raise SignalNameError(msg, names=())
-    names = (given,) if isinstance(given, str) else tuple(given)
+    names = as_tuple(given, what)
     if len(names) != count:
         msg = (
             f"{len(names)} names were given for {count} {what}: {listed([str(name) for name in names])}. Name each one."
@@ -174,10 +176,8 @@ def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
     SignalNameError
         As `checked_names`, or a DOF is named like the velocity or acceleration of another.
     """
-    names = (given,) if isinstance(given, str) else tuple(given)
-    if len(names) <= MOST_CACHED and all(type(name) is str for name in names):
-        return _cached_dofs(names, count)
-    return _checked_dofs(names, count)
+    names = as_tuple(given, "DOFs")
+    return _cached_dofs(names, count) if len(names) <= MOST_CACHED else _checked_dofs(names, count)
 
 
 @lru_cache(maxsize=256)
@@ -212,9 +212,49 @@ def derivative_stems(name: str) -> list[tuple[str, int]]:
     ]
 
 
-def as_tuple(names: Names) -> tuple[str, ...]:
-    """Read one name, several or none as a tuple."""
-    return (names,) if isinstance(names, str) else tuple(names or ())
+def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
+    """Read one name, several or none as a tuple of text; whole numbers in a list are read as text (node numbers).
+
+    Raises
+    ------
+    SignalNameError
+        A set, whose order changes from run to run, a mapping, a single number, or what holds other things than text
+        and whole numbers.
+
+    Examples
+    --------
+    >>> as_tuple("y"), as_tuple([101, 102]), as_tuple(None)
+    (('y',), ('101', '102'), ())
+    """
+    if isinstance(names, str):
+        return (str(names),)
+    if names is None:
+        return ()
+    if isinstance(names, set | frozenset | Mapping | bytes) or not hasattr(names, "__iter__"):
+        kind = type(names).__name__
+        order = ", whose order changes from run to run" if isinstance(names, set | frozenset) else ""
+        msg = f"Names must be a text or a list of texts, not a {kind}{order}. Give a list, such as ['a', 'b']."
+        raise SignalNameError(msg, names=())
+    try:
+        found = tuple(names)
+    except TypeError as cause:  # an array without dimensions, a class
+        msg = f"Names must be a text or a list of texts, not a {type(names).__name__}. Give a list, such as ['a', 'b']."
+        raise SignalNameError(msg, names=()) from cause
+    return found if all([type(name) is str for name in found]) else _as_texts(found, what)  # noqa: C419  # faster
+
+
+def _as_texts(names: tuple[object, ...], what: str) -> tuple[str, ...]:
+    for name in names:
+        if isinstance(name, bool) or not isinstance(name, str | int | np.integer):
+            msg = (
+                f"Names{f' of {what}' if what else ''} must be non-empty text without blanks at the ends, or whole "
+                f"numbers in a list, not a {type(name).__name__}. Name each one."
+            )
+            raise SignalNameError(msg, names=(type(name).__name__,))
+        if not isinstance(name, str) and abs(int(name)) > LARGEST_NUMBER:
+            msg = f"A number as a name may have 18 digits, not {int(name).bit_length()} bits."
+            raise SignalNameError(msg, names=())
+    return tuple([str(name) for name in names])
 
 
 def physical_places(names: Iterable[str], dofs: tuple[str, ...], what: Literal["input", "output"]) -> dict[str, int]:
@@ -303,9 +343,12 @@ def picked_places(
 
 
 def unknown_name_error(name: str, what: str, known: Iterable[str]) -> SignalNameError:
-    """Make the refusal of a name that is not in the model, with the ones that are."""
-    msg = f"The model has no {what} {name!r}. Known: {listed(list(known), most=24)}."
-    return SignalNameError(msg, names=(name,))
+    """Make the refusal of a name that is not in the model, with the nearest ones and the first of all."""
+    names = list(known)
+    near = difflib.get_close_matches(str(name), names, n=3, cutoff=CLOSE)
+    nearest = f" Nearest: {', '.join(near)}." if near else ""
+    msg = f"The model has no {what} {name!r}. Known: {listed(names, most=24)}.{nearest}"
+    return SignalNameError(msg, names=(str(name),))
 
 
 def _duplicates(names: Iterable[str]) -> tuple[str, ...]:

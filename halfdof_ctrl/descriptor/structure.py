@@ -14,6 +14,7 @@ from halfdof_ctrl.descriptor.first_order import first_order_pencil
 from halfdof_ctrl.descriptor.found_structure import found_structure
 from halfdof_ctrl.descriptor.growth import improper_pairs
 from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
@@ -113,7 +114,11 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     >>> structure.improper_pairs
     (('F_q2', 'q2', 2),)
     """
-    model = dense_copy(model, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
+    model = dense_copy(
+        checked_model(model, "pencil_structure"),
+        "pencil_structure",
+        "The poles of mech2ss(model) are the finite eigenvalues.",
+    )
     found = found_structure(model.quadratics.P)
     order = order_by_size(found.values)
     return PencilStructure(

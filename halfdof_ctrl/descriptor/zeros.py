@@ -16,6 +16,7 @@ from halfdof_ctrl.descriptor.minors import invariant_zeros
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
@@ -68,7 +69,9 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     >>> zeros(mechss(np.eye(2), None, [[5, -4], [-4, 4]], [1, 0], [1, 0])).imag.round(9).tolist()
     [2.0, -2.0]
     """
-    model = dense_copy(model, "zeros", "Take those of a reduced model: zeros(truncate_modes(...)).")
+    model = dense_copy(
+        checked_model(model, "zeros"), "zeros", "Take those of a reduced model: zeros(truncate_modes(...))."
+    )
     require_regular(model)
     every = _independent(model)
     found = invariant_zeros(system_pencil(model, *every))

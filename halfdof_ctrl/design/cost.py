@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
+from halfdof_ctrl.base.doors import is_real_number, shown, wrong_object
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -134,19 +135,25 @@ def _energy_parts(reduction: ExactReduction, weight: float) -> list[tuple[FloatA
     ]
 
 
-def _checked_weights(weights: Weights, known: tuple[str, ...], what: str) -> Iterator[tuple[str, float]]:
-    for name, value in (weights or {}).items():
+def _checked_weights(weights: object, known: tuple[str, ...], what: str) -> Iterator[tuple[str, float]]:
+    if weights is None:
+        return
+    if not isinstance(weights, Mapping):
+        example = f"such as {{{known[0]!r}: 1.0}}"
+        raise wrong_object("A weight", f"a mapping from {what} to a number, {example}", weights, parameter="weights")
+    for name, value in weights.items():
         if name not in known:
             raise unknown_name_error(name, what, known)
         yield name, _checked_weight(name, value)
 
 
-def _checked_weight(name: str, value: float) -> float:
+def _checked_weight(name: str, value: object) -> float:
     """Read one weight: a finite number that is not negative."""
-    if isinstance(value, bool | str) or not np.isreal(value) or not math.isfinite(value) or value < 0.0:
-        msg = f"The weight of {name} is {value!r}, but it must be a finite number that is not negative."
+    number = float(value) if is_real_number(value) else math.nan  # type: ignore[arg-type]
+    if not math.isfinite(number) or number < 0.0:
+        msg = f"The weight of {name} is {shown(value)}, but it must be a finite number that is not negative."
         raise WeightError(msg, names=(name,))
-    return float(value)
+    return number
 
 
 def _require_convex(cost: Cost, inputs: tuple[str, ...]) -> None:

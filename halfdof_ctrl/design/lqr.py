@@ -14,7 +14,8 @@ A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is t
     M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any, get_args
 
 import control
 import numpy as np
@@ -22,7 +23,14 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.errors import InaccurateGainWarning, StabilizationError, WeightError, give_warning
+from halfdof_ctrl.base.doors import is_choice, shown
+from halfdof_ctrl.base.errors import (
+    InaccurateGainWarning,
+    ParameterError,
+    StabilizationError,
+    WeightError,
+    give_warning,
+)
 from halfdof_ctrl.base.names import force_names, listed, motion_names
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
@@ -30,6 +38,7 @@ from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
 from halfdof_ctrl.design.reach import axis_eigenvalues, hidden_mode
 from halfdof_ctrl.design.riccati import Solver, solved_care
 from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -57,6 +66,13 @@ class StateFeedback:
     gain_error: float  #: estimated error of K, relative to the gain of each input in scaled states
     closed_loop: control.StateSpace  #: from the model's inputs to its outputs, with the feedback
     poles: ComplexArray  #: (N,) of the closed loop [rad/s]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the closed loop by its matrices and labels, since python-control's objects hold functions."""
+        sys = self.closed_loop
+        others = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "closed_loop"}
+        labels = {"states": sys.state_labels, "inputs": sys.input_labels, "outputs": sys.output_labels}
+        return _rebuilt, (others, (sys.A, sys.B, sys.C, sys.D), {**labels, "name": sys.name})
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -127,6 +143,11 @@ class _Solved:
     poles: ComplexArray
 
 
+def _rebuilt(others: dict[str, Any], matrices: tuple[FloatArray, ...], labels: dict[str, Any]) -> StateFeedback:
+    """Make a feedback again of what was pickled."""
+    return StateFeedback(**others, closed_loop=control.StateSpace(*matrices, **labels))
+
+
 def lqr(
     model: SecondOrderModel,
     Q: npt.ArrayLike | None = None,
@@ -192,7 +213,12 @@ def lqr(
     [[1.0, 1.414214]]
     """
     physical = {"displacement": displacement, "velocity": velocity, "acceleration": acceleration}
-    model = dense_copy(model, "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R).")
+    if not is_choice(method, get_args(Solver)):
+        msg = f"method must be one of {listed(get_args(Solver))}, not {shown(method)}."
+        raise ParameterError(msg, parameter="method", value=method)
+    model = dense_copy(
+        checked_model(model, "lqr"), "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R)."
+    )
     reduction = exact_reduction(model)
     if reduction.order == 0:
         msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."

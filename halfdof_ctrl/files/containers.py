@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.base.doors import require_path
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.mat4 import is_mat4, mat4_variables
 from halfdof_ctrl.files.formats.mat5 import mat5_variables
@@ -30,6 +31,7 @@ ARRAY_ENDINGS = (*MATRIX_ENDINGS, ".npy")
 
 def ending(path: PathLike, known: Sequence[str]) -> str:
     """Return the ending of a path in small letters, and refuse one that is not known."""
+    require_path(path, "A file name")
     suffix = Path(path).suffix.lower()
     if suffix not in known:
         msg = f"{path}: the ending {suffix or '(none)'} names no format for this. Use {', '.join(known)}."

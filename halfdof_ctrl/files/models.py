@@ -24,6 +24,7 @@ from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_model import Paths, import_model, import_report
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.law_text import stored_elements
 from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
@@ -60,7 +61,7 @@ def save_model(model: SecondOrderModel | NonlinearModel, path: PathLike) -> None
     ('y', 'y1', 'y2')
     """
     elements = stored_elements(model.elements) if isinstance(model, NonlinearModel) else ()
-    model = model.linear if isinstance(model, NonlinearModel) else model
+    model = model.linear if isinstance(model, NonlinearModel) else checked_model(model, "save_model")
     kept = [letter for letter in LETTERS if letter not in OPTIONAL_LETTERS or not is_zero(getattr(model, letter))]
     kept.sort(key="K".__eq__)  # last, so that no beginning of a file passes for a model
     content = {letter: getattr(model, letter) for letter in kept}

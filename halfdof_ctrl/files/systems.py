@@ -11,6 +11,7 @@ from halfdof_ctrl.base.names import checked_names, listed
 from halfdof_ctrl.files.containers import Content, PathLike, load_variables, single_text, texts
 from halfdof_ctrl.files.naming import naming_the_file
 from halfdof_ctrl.files.writing import save_matrices
+from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 SYSTEM_LETTERS = StateSpaceData._fields
@@ -34,6 +35,7 @@ def save_system(sys: control.StateSpace, path: PathLike) -> None:
     OSError
         The file cannot be written.
     """
+    sys = checked_system(sys, "save_system")
     content = StateSpaceData.of(sys)._asdict()
     if sys.dt is not None:
         content["dt"] = np.array(UNKNOWN_PERIOD if sys.dt is True else float(sys.dt))

@@ -8,6 +8,7 @@ from typing import Any
 import control
 import numpy as np
 
+from halfdof_ctrl.base.doors import wrong_object
 from halfdof_ctrl.base.names import name_from_label
 from halfdof_ctrl.design.lqr import StateFeedback
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS, PathLike, ending
@@ -101,6 +102,9 @@ def save_response(data: control.FrequencyResponseData | control.TimeResponseData
         The file cannot be written.
     """
     ending(path, TABLE_ENDINGS)
+    if not isinstance(data, control.FrequencyResponseData | control.TimeResponseData):
+        wanted = "a response of python-control, of frequency_response or step_response"
+        raise wrong_object("save_response", wanted, data, parameter="data")
     header, columns = time_table(data) if isinstance(data, control.TimeResponseData) else frequency_table(data)
     _save_table(path, header, (map(repr, row) for row in np.column_stack(columns).tolist()))
 

@@ -126,7 +126,12 @@ def _checked(value: object, letter: str, shape: tuple[int, int], *, sparse: bool
 
 def _count(value: Any, n: int, axis: int) -> int:  # noqa: ANN401  # whatever the user gave
     """Count the inputs or outputs, one for a list of n numbers."""
-    shape = np.shape(value) if not hasattr(value, "shape") else value.shape
+    try:
+        shape = np.shape(value) if not hasattr(value, "shape") else value.shape
+    except (TypeError, ValueError):  # ragged: left to the check of the matrix itself
+        return 1
+    if not isinstance(shape, tuple):
+        return 1
     return 1 if len(shape) == 1 and shape[0] == n else int(shape[axis]) if len(shape) > axis else 1
 
 

@@ -9,9 +9,9 @@ classes join parts. Elements know no model; that a DOF exists is seen where they
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any, TypeAlias
 
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, checked_names
 from halfdof_ctrl.model.law import Law
@@ -203,12 +203,12 @@ def _check_ends(kind: str, a: object, b: object) -> None:
 def _checked_law(kind: str, a: str, b: str | None, law: Any) -> Law | float:  # noqa: ANN401  # whatever the user gave
     if isinstance(law, Law):
         return law
-    if isinstance(law, Real) and math.isfinite(law):
+    if is_real_number(law) and math.isfinite(law):
         return float(law)
     hint = (
         " Wrap a function as Law(function)." if callable(law) else " Give law=, a number or one of halfdof_ctrl.laws."
     )
-    msg = f"The {kind} between {ends_in_words(a, b)} needs a law or a finite number, not {law!r}. {hint}"
+    msg = f"The {kind} between {ends_in_words(a, b)} needs a law or a finite number, not {shown(law)}. {hint}"
     raise ParameterError(msg, parameter="law", value=law)
 
 

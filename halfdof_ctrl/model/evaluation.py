@@ -12,6 +12,8 @@ import numpy.typing as npt
 from scipy.linalg.lapack import zgetrf, zgetrs
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two
+from halfdof_ctrl.base.doors import require_switch, shown
+from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
@@ -166,18 +168,28 @@ def checked_points(s: npt.ArrayLike) -> ComplexArray:
 
     Raises
     ------
-    ValueError
-        More dimensions.
+    ParameterError
+        More dimensions, or no numbers.
     """
-    points = np.asarray(s, dtype=np.complex128)
+    try:
+        given = np.asarray(s)
+        points = given.astype(np.complex128) if given.dtype.kind in "biufcO" else None
+    except (TypeError, ValueError, OverflowError) as cause:
+        msg = f"s must be numbers [rad/s], not {shown(s)}: {cause}."
+        raise ParameterError(msg, parameter="s", value=s) from cause
+    if points is None:
+        msg = f"s must be numbers [rad/s], not {shown(s)}."
+        raise ParameterError(msg, parameter="s", value=s)
     if points.ndim > 1:
         msg = f"s must be a number or a 1D array, but it has {points.ndim} dimensions."
-        raise ValueError(msg)
+        raise ParameterError(msg, parameter="s", value=s)
     return points
 
 
 def squeezed(values: ComplexArray, *, scalar: bool, squeeze: bool | None) -> ComplexArray:
     """Drop axes of a (p, m, k) response as python-control does."""
+    if squeeze is not None:
+        require_switch(squeeze, "squeeze")
     if squeeze is None:
         squeeze = values.shape[:2] == (1, 1)
         values = values[0, 0] if squeeze else values

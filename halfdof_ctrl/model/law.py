@@ -159,6 +159,6 @@ def _limit(quotients: np.ndarray) -> float:
 def _is_rising_pair(pair: object) -> bool:
     try:
         low, high = (float(value) for value in pair)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError, OSError):
         return False
     return low < high

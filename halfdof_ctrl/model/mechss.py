@@ -13,6 +13,7 @@ from halfdof_ctrl.base.arrays import (
     checked_matrix,
     checked_square_matrices,
 )
+from halfdof_ctrl.base.doors import require_text
 from halfdof_ctrl.base.names import (
     DERIVATIVE_SUFFIXES,
     FORCE_PREFIX,
@@ -104,6 +105,7 @@ def mechss(
       inputs:  F_mass, F_joint
       outputs: mass, joint
     """
+    require_text(name, "name")
     M, C, K = (checked_sparse_squares if has_sparse((M, C, K)) else checked_square_matrices)((M, C, K), "MCK")
     n = M.shape[0]
     names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
@@ -148,9 +150,18 @@ def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int
     """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
     for value in given:
         if value is not None:
-            shape = np.shape(cast("npt.ArrayLike", value))
+            shape = _shape(value)
             return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
     return default
+
+
+def _shape(value: MatrixLike) -> tuple[int, ...]:
+    """Return the shape of a matrix; that of what is none is left to the check of the matrix itself."""
+    try:
+        shape = np.shape(cast("npt.ArrayLike", value))
+    except (TypeError, ValueError):
+        return ()
+    return shape if isinstance(shape, tuple) else ()
 
 
 def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: ModelMatrix) -> ModelMatrix:

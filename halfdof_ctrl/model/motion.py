@@ -23,6 +23,7 @@ from typing import Literal, Protocol, TypeAlias, get_args
 import numpy as np
 
 from halfdof_ctrl.base.arrays import DenseMatrix, ModelMatrix
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import (
     Names,
@@ -96,7 +97,7 @@ def prescribed_signals(model: Named, dof: Names, kind: MotionKind, inputs: Names
     SignalNameError
         A DOF that is unknown, named twice or prescribed already; no DOF left; a name that is taken.
     """
-    if kind not in KINDS:
+    if not is_choice(kind, KINDS):
         msg = f"kind must be one of {listed(KINDS)}, not {kind!r}."
         raise ParameterError(msg, parameter="kind", value=kind)
     derivative = KINDS.index(kind)

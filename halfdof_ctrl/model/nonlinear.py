@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.doors import items_of
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, listed, reaction_names, unknown_name_error
 from halfdof_ctrl.model.checked_laws import check_force, check_law
@@ -270,7 +271,11 @@ def nlmechss(
             "first."
         )
         raise ModelSizeError(msg, size=len(model.dofs), limit=LARGEST_NONLINEAR)
-    given = (elements,) if isinstance(elements, Spring | Damper | Force) else tuple(elements)
+    given = (
+        (elements,)
+        if isinstance(elements, Spring | Damper | Force)
+        else tuple(items_of(elements, "elements", "a list of Spring, Damper and Force", parameter="elements"))
+    )
     for element in given:
         _require_element(element)
     for element, words in zip(given, element_words(given), strict=True):

@@ -15,7 +15,7 @@ from typing import Any
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT, EPS, ComplexArray, ModelMatrix, is_complex, read_only
-from halfdof_ctrl.base.errors import ModelSizeError
+from halfdof_ctrl.base.errors import ModelSizeError, WrongObjectError
 from halfdof_ctrl.base.names import Names, as_tuple, listed, picked_places
 from halfdof_ctrl.base.sparse_arrays import (
     as_sparse,
@@ -86,7 +86,12 @@ class SecondOrderModel:
     def _matrices(self) -> tuple[ModelMatrix, ...]:
         return (self.M, self.C, self.K, self.B, self.Bv, self.Ba, self.F, self.G, self.H, self.D, self.Dv, self.Da)
 
-    def __call__(self, s: npt.ArrayLike, squeeze: bool | None = None) -> ComplexArray:  # noqa: FBT001  # as in control
+    def __call__(
+        self,
+        s: npt.ArrayLike,
+        squeeze: bool | None = None,  # noqa: FBT001  # as in control
+        *update: object,
+    ) -> ComplexArray:
         """Transfer function H(s) of equation (1) by a direct solve at each `s`.
 
         Parameters
@@ -96,6 +101,8 @@ class SecondOrderModel:
         squeeze : bool, optional
             As in `control.StateSpace.__call__`: by default a single-input single-output model gives
             a scalar or 1D array; False keeps (p, m, len(s)), True drops every axis of length one.
+        *update
+            Nothing: python-control gives more where it takes the model for a function of time, as `control.ss` does.
 
         Returns
         -------
@@ -110,6 +117,10 @@ class SecondOrderModel:
         >>> complex(mechss([[1]], [[0]], [[4]], [[2]])(0))
         (0.5+0j)
         """
+        if update:
+            taker = "A model is a function of s alone, so control.ss and control.nlsys cannot take it"
+            msg = f"{taker}: use hd.mech2ss(model), which gives the state space."
+            raise WrongObjectError(msg, parameter="s", value=s)
         points = checked_points(s)
         values = quadratic_transfer(*self.quadratics, points.reshape(-1))
         return squeezed(values, scalar=points.ndim == 0, squeeze=squeeze)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import real_numbers
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.names import unknown_name_error
 
@@ -106,7 +107,11 @@ def _parts(given: Any, names: tuple[str, ...], times: FloatArray) -> list[Any]: 
         return [0.0 if given is None else given] * m
     if isinstance(given, Sequence) and len(given) == m and (m > 1 or not np.isscalar(given[0])):
         return list(given)
-    array = np.asarray(given, dtype=float) if not isinstance(given, Sequence) else _ragged(given, m, times)
+    array = (
+        real_numbers(given, "inputs", "numbers, samples or functions of time")
+        if not isinstance(given, Sequence)
+        else _ragged(given, m, times)
+    )
     if m == 1 and array.shape in {times.shape, (1, times.size)}:
         return [array.reshape(-1)]
     if array.shape == (m, times.size):
@@ -133,7 +138,7 @@ def _shape_error(shape: tuple[int, ...], m: int, times: FloatArray) -> MatrixErr
 
 
 def _numbers(part: Any, times: FloatArray) -> FloatArray:  # noqa: ANN401
-    values = np.asarray(part, dtype=float)
+    values = real_numbers(part, "inputs", "numbers, samples or functions of time")
     if values.ndim and values.shape != times.shape:
         msg = f"An input has {values.shape} samples for {times.size} times. Give one for each time."
         raise MatrixError(msg, matrix="inputs")
@@ -148,10 +153,14 @@ def _of_functions(parts: list[Any], every: Callable[[float], Any] | None, times:
     ]
 
     def at(t: float) -> FloatArray:
-        if every is not None:
-            values = np.asarray(every(t), dtype=float).reshape(-1)
-        else:
-            values = np.array([float(np.asarray(piece(t)).reshape(-1)[0]) for piece in pieces])
+        try:
+            if every is not None:
+                values = real_numbers(every(t), "inputs(t)", f"{m} numbers").reshape(-1)
+            else:
+                values = np.array([float(np.asarray(piece(t)).reshape(-1)[0]) for piece in pieces])
+        except TypeError as cause:
+            msg = f"inputs is called with the time alone, and must give {m} numbers; this failed: {cause}."
+            raise ParameterError(msg, parameter="inputs", value=t) from cause
         if values.size != m or not np.isfinite(values).all():
             msg = f"inputs(t) gives {values} at t = {t:.6g} s, but must give {m} finite numbers."
             raise ParameterError(msg, parameter="inputs", value=t)

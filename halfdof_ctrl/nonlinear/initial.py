@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import real_number, real_numbers
 from halfdof_ctrl.base.errors import MatrixError
 from halfdof_ctrl.base.names import motion_names, unknown_name_error
 from halfdof_ctrl.model.nonlinear import Values
@@ -24,7 +25,7 @@ def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Valu
     if initial is None:
         initial = {}
     if not isinstance(initial, Mapping):
-        x = np.asarray(getattr(initial, "state", initial), dtype=float)
+        x = real_numbers(getattr(initial, "state", initial), "initial", "a state, or a mapping from names to numbers")
         if x.ndim == 0 and N:
             x = np.full(N, float(x))
         if x.shape != (N,) or not np.isfinite(x).all():
@@ -41,7 +42,7 @@ def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Valu
     for name, value in initial.items():
         if name not in names:
             raise unknown_name_error(name, "displacement or velocity", names)
-        given[names.index(name)] = float(value)
+        given[names.index(name)] = real_number(value, str(name))
     if np.isinf(given).any():
         msg = "Initial displacements and velocities must be finite numbers."
         raise MatrixError(msg, matrix="initial")

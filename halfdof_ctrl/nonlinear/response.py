@@ -17,6 +17,7 @@ import numpy.typing as npt
 import scipy.integrate
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import (
     InterruptedResponseWarning,
     MatrixError,
@@ -26,6 +27,7 @@ from halfdof_ctrl.base.errors import (
 )
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.progress import progress_bar
+from halfdof_ctrl.model.doors import checked_nonlinear
 from halfdof_ctrl.model.nonlinear import NonlinearModel, Values
 from halfdof_ctrl.nonlinear.answers import UnansweredError
 from halfdof_ctrl.nonlinear.easing import eased_answers
@@ -100,7 +102,7 @@ def nonlinear_response(
     >>> abs(response.outputs.round(6)).tolist()
     [1.0, 0.25, 0.0]
     """
-    reduction = reduce_nonlinear(nonlinear)
+    reduction = reduce_nonlinear(checked_nonlinear(nonlinear, "nonlinear_response"))
     require_proper(reduction)
     times = _checked_times(timepts)
     _require_valid(rtol, method)
@@ -269,7 +271,7 @@ def _response(
 def _checked_times(timepts: npt.ArrayLike) -> FloatArray:
     try:
         times = np.array(timepts, dtype=float)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         msg = f"timepts must be rising numbers [s], not {timepts!r}."
         raise MatrixError(msg, matrix="timepts") from cause
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
@@ -279,7 +281,7 @@ def _checked_times(timepts: npt.ArrayLike) -> FloatArray:
 
 
 def _require_valid(rtol: float, method: str) -> None:
-    if method not in METHODS:
+    if not is_choice(method, METHODS):
         msg = f"method must be one of {', '.join(METHODS)}, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
     if not (isinstance(rtol, int | float) and LEAST_STEP_TOLERANCE <= rtol < 1.0):

@@ -8,6 +8,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ImproperError
 from halfdof_ctrl.base.names import control_label, control_labels, listed
+from halfdof_ctrl.model.doors import checked_nonlinear
 from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.nonlinear.reduction import NonlinearReduction, reduce_nonlinear
 from halfdof_ctrl.nonlinear.small_motion import feedback_of_elements
@@ -82,7 +83,7 @@ def mech2nlsys(nonlinear: NonlinearModel) -> control.NonlinearIOSystem:
     >>> mech2nlsys(oil).dynamics(0.0, [0.0], [8.0])
     array([2.])
     """
-    reduction = reduce_nonlinear(nonlinear)
+    reduction = reduce_nonlinear(checked_nonlinear(nonlinear, "mech2nlsys"))
     require_proper(reduction)
     A, B, B_d = reduction.A, reduction.B, reduction.B_d
     output, m = reduction.output, len(nonlinear.inputs)

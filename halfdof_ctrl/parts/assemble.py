@@ -16,6 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
+from halfdof_ctrl.base.doors import items_of
 from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -126,7 +127,11 @@ def _with_joined_models(
     found: list[AnyJoint] = []
     every = dict(parts) if isinstance(parts, Mapping) else parts  # `points_of` refuses what are no parts
     number = 0
-    for joint in (joints,) if isinstance(joints, Rigid | Spring | Damper | Joint) else joints:
+    for joint in (
+        (joints,)
+        if isinstance(joints, Rigid | Spring | Damper | Joint)
+        else items_of(joints, "joints", "a list of Rigid, Spring, Damper and Joint", parameter="joints")
+    ):
         if not isinstance(cast("object", joint), Rigid | Spring | Damper | Joint):
             msg = f"{joint!r} is no joint: take Rigid, Spring, Damper or Joint."
             raise ParameterError(msg, parameter="joints", value=joint)

@@ -16,8 +16,9 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import as_tuple, listed
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -103,12 +104,13 @@ def checked(value: object, symbol: str, unit: str, *, positive: bool = False) ->
     ParameterError
         Negative, NaN, Inf or no number; 0 if it must be positive.
     """
-    sound = isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+    sound = is_real_number(value)
     number = float(value) if sound else math.nan  # type: ignore[arg-type]
     if not (math.isfinite(number) and (number > 0.0 if positive else number >= 0.0)):
         allowed = "a positive number" if positive else "a number that is not negative"
         msg = (
-            f"{symbol} = {value!r} {unit}, but it must be {allowed}, so that the part stays passive and its nodes held."
+            f"{symbol} = {shown(value)} {unit}, but it must be {allowed}, so that the part stays passive and its nodes "
+            "held."
         )
         raise ParameterError(msg, parameter=symbol, value=value)
     return number
@@ -138,4 +140,4 @@ def axis_name(node: str, axis: str) -> str:
 def _split(axes: str | Sequence[str]) -> tuple[str, ...]:
     if isinstance(axes, str):
         return (axes,) if axes in AXES else tuple(axes)
-    return tuple(axes)
+    return as_tuple(axes)

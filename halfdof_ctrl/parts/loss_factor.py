@@ -24,9 +24,11 @@ from scipy.sparse import csc_array, diags_array, kron
 from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix, read_only
+from halfdof_ctrl.base.doors import is_choice, is_real_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.loss_branches import Branches, Loss, band_points, enough_branches
@@ -38,6 +40,7 @@ LossFactor: TypeAlias = float | Callable[[FloatArray], FloatArray] | tuple[Seque
 STEEPEST = 1.0  #: slope of the loss over frequency in log-log that springs and dampers can follow
 SLOPE_ROUNDING = 1e-6  #: by which a computed slope may exceed it
 STIFFNESS_ROUNDING = 1e-12  #: of the largest: a negative eigenvalue of the static stiffness below is rounding
+MOST_BRANCHES = 1000  #: more than any loss over frequency needs
 SHIFT = 1e-9  #: of its diagonal, added to a sparse stiffness that is singular
 
 
@@ -158,7 +161,7 @@ def _what_is_lost(
     model: SecondOrderModel, loss_factor: LossFactor, band: tuple[float, float], keep: Keep
 ) -> tuple[SparseMatrix, SparseMatrix, Loss, bool]:
     """Give K, the matrix that the branches multiply, their loss over frequency, and whether that is constant."""
-    K = as_sparse(model.K)
+    K = as_sparse(checked_model(model, "with_maxwell_damping").K)
     others = tuple([letter for letter in model.complex_matrices if letter != "K"])
     if others or (model.is_complex and loss_factor is not None):
         msg = (
@@ -190,7 +193,11 @@ def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> 
         return lambda omega: np.full(np.shape(omega), eta), True
     loss = loss_factor if callable(loss_factor) else _tabulated(loss_factor, band)
     omega = band_points(band)
-    values = np.asarray(loss(omega), dtype=float)
+    try:
+        values = real_numbers(loss(omega), "loss_factor", "one positive number for each frequency")
+    except TypeError as cause:
+        msg = f"loss_factor is called with the frequencies [rad/s] alone, and this failed: {cause}."
+        raise ParameterError(msg, parameter="loss_factor", value=loss_factor) from cause
     if values.shape != omega.shape or not (np.isfinite(values) & (values > 0.0)).all():
         msg = "loss_factor must give one positive number for each frequency of the band."
         raise ParameterError(msg, parameter="loss_factor", value=None)
@@ -324,7 +331,7 @@ def _names(dofs: tuple[str, ...], count: int, rank: int) -> list[str]:
 def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = (float(value) for value in band)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OSError, OverflowError) as cause:
         msg = f"band = {band!r}, but it must be two frequencies (f1, f2) [Hz]."
         raise ParameterError(msg, parameter="band", value=band) from cause
     if not (np.isfinite(low) and np.isfinite(high) and 0.0 < low < high):
@@ -334,19 +341,21 @@ def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
 
 
 def _positive(value: object, parameter: str, unit: str) -> float:
-    number = float(value) if isinstance(value, int | float | np.integer | np.floating) else np.nan
+    number = float(value) if is_real_number(value) else np.nan  # type: ignore[arg-type]
     if not (np.isfinite(number) and number > 0.0):
-        msg = f"{parameter} = {value!r}{' ' if unit else ''}{unit}, but it must be a positive number."
+        msg = f"{parameter} = {shown(value)}{' ' if unit else ''}{unit}, but it must be a positive number."
         raise ParameterError(msg, parameter=parameter, value=value)
     return number
 
 
 def _require_options(keep: Keep, branches: int | None, tol: float) -> None:
-    if keep not in get_args(Keep):
+    if not is_choice(keep, get_args(Keep)):
         msg = f"keep must be one of {listed(get_args(Keep))}, not {keep!r}."
         raise ParameterError(msg, parameter="keep", value=keep)
-    if branches is not None and not (isinstance(branches, int | np.integer) and branches > 0):
-        msg = f"branches = {branches!r}, but it must be a whole number, at least 1."
+    if branches is not None and not (
+        is_real_number(branches) and isinstance(branches, int | np.integer) and 0 < branches <= MOST_BRANCHES
+    ):
+        msg = f"branches = {branches!r}, but it must be a whole number from 1 to {MOST_BRANCHES}."
         raise ParameterError(msg, parameter="branches", value=branches)
     if not (isinstance(tol, int | float) and 0.0 < tol < 1.0):
         msg = f"tol = {tol!r}, but it is a relative error: a number between 0 and 1, such as 0.02."

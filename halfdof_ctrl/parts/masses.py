@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
+from halfdof_ctrl.base.doors import real_numbers, require_mapping, require_switch
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import FORCE_PREFIX
 from halfdof_ctrl.model.mechss import mechss
@@ -103,6 +104,8 @@ def rigid_body(
     M = np.zeros((len(AXES), len(AXES)))
     M[:TRANSLATIONS, :TRANSLATIONS], M[TRANSLATIONS:, TRANSLATIONS:] = mass * np.eye(TRANSLATIONS), tensor
     rows, names = [np.eye(len(AXES))], list(AXES)
+    require_mapping({} if points is None else points, "points", "from names to places (x, y, z) [m]")
+    require_switch(rotations, "rotations")
     for name, place in (points or {}).items():
         axes = AXES if rotations else AXES[:TRANSLATIONS]
         rows.append(_lever(name, place)[: len(axes)])
@@ -133,7 +136,7 @@ def _lever(name: str, place: Sequence[float]) -> FloatArray:
 
 def _checked_inertia(inertia: npt.ArrayLike) -> FloatArray:
     """Give the (3, 3) tensor, and refuse one that no body has: J is semidefinite, and no moment exceeds the others."""
-    given = np.asarray(inertia)
+    given = real_numbers(inertia, "inertia", "three moments or a 3 x 3 tensor [kg m^2]")
     tensor = checked_matrix(np.diag(given) if given.shape == (TRANSLATIONS,) else given, "J", (TRANSLATIONS,) * 2)
     if np.iscomplexobj(tensor) or np.abs(tensor - tensor.T).max() > INERTIA_ROUNDING * np.abs(tensor).max():
         msg = f"inertia = {tensor.tolist()} kg m^2 is not a real symmetric tensor."

@@ -96,7 +96,7 @@ def typical_scatter(values: npt.NDArray[np.inexact]) -> float:
 def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple[FloatArray, ComplexArray]:
     try:
         f, K = np.array(frequency, dtype=float), np.array(stiffness, dtype=complex)
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         msg = f"frequency must be a list of real numbers [Hz] and stiffness one of complex numbers: {cause}."
         raise ParameterError(msg, parameter="stiffness", value=None) from cause
     if f.ndim != 1 or f.shape != K.shape or f.size < FEWEST:

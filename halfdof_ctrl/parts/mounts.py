@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -98,12 +99,12 @@ def hydromount(
     >>> hydromount().K.tolist()
     [[5500.0, 0.0, -500.0], [0.0, 1000.0, 0.0], [-500.0, 0.0, 1000.0]]
     """
-    if not (math.isfinite(m) and m >= 0.0):
-        msg = f"m = {m} kg, but the mass on the mount must be a number that is not negative; 0 for the mount alone."
+    if not (is_real_number(m) and math.isfinite(m) and m >= 0.0):
+        msg = f"m = {shown(m)} kg, but the mass on the mount must be a number, not negative; 0 for the mount alone."
         raise ParameterError(msg, parameter="m", value=m)
     for symbol, value in (("K_r", K_r), ("K_rs", K_rs), ("K_v", K_v), ("K_s", K_s), ("C_rs", C_rs), ("C_h", C_h)):
-        if not (math.isfinite(value) and value >= 0.0):
-            msg = f"{symbol} = {value}, but a stiffness [N/m] or damping [N s/m] must be a number that is not negative."
+        if not (is_real_number(value) and math.isfinite(value) and value >= 0.0):
+            msg = f"{symbol} = {shown(value)}, but a stiffness [N/m] or damping [N s/m] must be a number, not negative."
             raise ParameterError(msg, parameter=symbol, value=value)
     return mechss(
         [[m, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]],

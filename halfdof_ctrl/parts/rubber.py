@@ -19,9 +19,12 @@ Hydraulic mounts: `halfdof_ctrl.parts.hydraulic`. Sources: W. N. Findley, J. S. 
 of Nonlinear Viscoelastic Materials, 1976, chapter 5, has these four chains by the same names.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TypeAlias
 
+import numpy as np
+
+from halfdof_ctrl.base.doors import items_of
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import Axes, Link, Size, linked, part_axes, sized
@@ -178,7 +181,12 @@ def generalized_maxwell(k: Size, branches: Branches, *, c: Size = 0.0, axes: Axe
     >>> generalized_maxwell(1.0, [(3, 5), (4, 6)]).dofs
     ('top', 'bottom', '1', '2')
     """
-    pairs = [_pair(branch, number) for number, branch in enumerate(branches, start=1)]
+    pairs = [
+        _pair(branch, number)
+        for number, branch in enumerate(
+            items_of(branches, "branches", "a list of pairs (k_i, c_i)", parameter="branches"), 1
+        )
+    ]
     sizes = {f"k_{i}": pair[0] for i, pair in enumerate(pairs, 1)} | {f"c_{i}": p[1] for i, p in enumerate(pairs, 1)}
     found = part_axes(axes, k=k, c=c, **sizes)
     links = [
@@ -237,7 +245,12 @@ def _branch(node: str, k: Size, c: Size, axes: tuple[str, ...], symbols: tuple[s
 
 
 def _pair(branch: object, number: int) -> tuple[Size, Size]:
-    if isinstance(branch, str | Mapping) or not hasattr(branch, "__len__") or len(branch) != PAIR:
+    if (
+        not isinstance(branch, Sequence | np.ndarray)
+        or isinstance(branch, str)
+        or np.ndim(branch) == 0
+        or len(branch) != PAIR
+    ):
         msg = f"Branch {number} is {branch!r}, but each must be a pair (k_i [N/m], c_i [N s/m])."
         raise ParameterError(msg, parameter="branches", value=branch)
-    return branch[0], branch[1]  # type: ignore[index]
+    return branch[0], branch[1]

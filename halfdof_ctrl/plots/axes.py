@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 from matplotlib.legend import Legend
 from matplotlib.lines import Line2D
 
+from halfdof_ctrl.base.doors import require_text
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import name_from_label
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -107,6 +108,7 @@ def finished_plot(
     legend = draw_legend(axes, own=own)
     name = system.name or ""
     made_up = name.startswith("sys[") and name.endswith("]")
+    require_text(title, "title")
     if title is None and own and not made_up:
         title = plain(name_from_label(name))
     if title:
@@ -132,6 +134,7 @@ def require_system(sysdata: object) -> None:
 
 def legend_prefix(label: str | None) -> str:
     """Return what stands before the entries of a system in the legend."""
+    require_text(label, "label")
     return f"{plain(label)}: " if label else ""
 
 

@@ -203,7 +203,7 @@ def transmissibility_plot(
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
     """Return the models as a list, and the text of each in the legend; an underscore keeps it out."""
     given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
-    models = list(given) if isinstance(given, Iterable) else []
+    models = list(given) if isinstance(given, Iterable) and not isinstance(given, np.ndarray) else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
         msg = f"sysdata must be a SecondOrderModel or a list of some, not {type(sysdata).__name__}."
         raise ParameterError(msg, parameter="sysdata", value=sysdata)

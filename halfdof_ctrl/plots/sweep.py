@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.doors import require_mapping, require_text, wrong_object
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.model.mechss import mechss
@@ -108,6 +109,7 @@ def sweep_plot(
         lines, axes = _draw_poles(result, cases, ax, grid=grid)
     cases.draw_bar(axes, units)
     legend = draw_legend(axes, own=ax is None)
+    require_text(title, "title")
     if title:
         draw_title(axes, title, own=ax is None)
     return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)
@@ -115,7 +117,11 @@ def sweep_plot(
 
 def _checked_kind(result: SweepResult, kind: str | None) -> str:
     """Find what there is to draw."""
+    if not isinstance(result, SweepResult):
+        raise wrong_object("sweep_plot", "what sweep returned", result, parameter="result")
     there = {"bode": result.response, "poles": result.poles}
+    if kind is not None and not isinstance(kind, str):
+        raise wrong_object("kind", "'bode' or 'poles'", kind, parameter="kind")
     wanted = kind or ("poles" if result.response is None else "bode")
     if wanted not in there:
         msg = f"kind = {kind!r}, but a sweep is drawn as 'bode' or 'poles'."
@@ -152,6 +158,7 @@ def _draw_curves(
 
 def _signal_units(result: SweepResult, units: Units) -> dict[str, str]:
     """Return the units of the signals, as a model with the same DOFs has them."""
+    require_mapping({} if units is None else units, "units", "from names of signals to their units")
     given = {name: unit for name, unit in (units or {}).items() if name not in result.parameters}
     own = {name: unit for name, unit in given.items() if name in {*result.inputs, *result.outputs} - {*result.dofs}}
     rest = {name: unit for name, unit in given.items() if name not in own}

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
+from halfdof_ctrl.base.doors import require_mapping, require_text
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.plots.axes import AxesArray
@@ -80,6 +81,8 @@ def coloured_cases(result: SweepResult, parameter: str | None, at: Mapping[str, 
     ParameterError
         A parameter or a value that the sweep does not have; no case that was done.
     """
+    require_mapping({} if at is None else at, "at", "from parameters to values")
+    require_text(parameter, "parameter")
     numbers = _kept(result, at or {})
     several = [name for name, values in result.parameters.items() if len(_distinct(values.reshape(-1)[numbers])) > 1]
     if parameter is not None:

@@ -1,10 +1,11 @@
 """Units and labels of signals on axes."""
 
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import control
 
+from halfdof_ctrl.base.doors import require_mapping, wrong_object
 from halfdof_ctrl.base.names import (
     MOST_CACHED,
     force_names,
@@ -35,7 +36,7 @@ def known_units(system: control.StateSpace | SecondOrderModel, units: Units) -> 
     SignalNameError
         A unit for a signal that the system does not have.
     """
-    given = dict(units or {})
+    given = _given_units(units)
     known: dict[str, str | None] = {}
     if isinstance(system, SecondOrderModel):
         names: set[str] = {*system.inputs, *system.outputs}
@@ -107,6 +108,18 @@ def ratio_unit(output: str, source: str, units: Mapping[str, str]) -> str:
     over = f"({over})" if set(over) & set("/ ") else over
     under = f"({under})" if set(under) & set("/ ") else under
     return "-" if over == under else typeset(f"{over}/{under}")
+
+
+def _given_units(units: Mapping[str, Any] | None) -> dict[str, str]:
+    """Read the units that the user gives: texts by names."""
+    if units is None:
+        return {}
+    require_mapping(units, "units", "from names of signals to their units")
+    for name, unit in units.items():
+        if not isinstance(unit, str):
+            taker = f"The unit of {name}"
+            raise wrong_object(taker, "text, such as 'm'", unit, parameter="units")
+    return dict(units)
 
 
 def plain(name: str) -> str:

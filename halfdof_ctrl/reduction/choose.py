@@ -5,8 +5,10 @@ with it, and what of that a user must know is warned of once, here.
 """
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError
 from halfdof_ctrl.model.dense_copy import complex_model_error
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.deflation.method import by_deflation
 from halfdof_ctrl.reduction.dense.method import by_bases, by_selection
@@ -76,7 +78,7 @@ def exact_reduction(
     >>> exact_reduction(mechss([[0]], [[5]], [[10]])).A
     array([[-2.]])
     """
-    if model.is_complex:
+    if checked_model(model, "exact_reduction").is_complex:
         raise complex_model_error(model)
     _require_valid(tol, method)
     solution = _sparsely_solved(model, tol, method) if model.is_sparse else None
@@ -116,7 +118,7 @@ def _sparsely_solved(model: SecondOrderModel, tol: float | None, method: MethodN
 
 
 def _require_valid(tol: float | None, method: MethodName | None) -> None:
-    if method is not None and method not in METHODS:
+    if method is not None and not is_choice(method, METHODS):
         msg = f"method must be 'selection', 'orthogonal', 'deflation' or None, not {method!r}."
         raise ParameterError(msg, parameter="method", value=method)
     if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):

@@ -24,8 +24,10 @@ from halfdof_ctrl.reduction.method.recovery import (
     RecoveredMotion,
     TimeResponse,
     forward_slope,
+    given_inputs,
     given_values,
     require_consistent,
+    require_response,
 )
 from halfdof_ctrl.reduction.method.signals import Signal
 
@@ -185,7 +187,7 @@ class ExactReduction:
         model = self.model
         q = given_values(q0, model.dofs, "displacement")
         v = given_values({} if v0 is None else v0, model.dofs, "velocity")
-        u = np.broadcast_to(np.asarray(u0, dtype=float), (len(model.inputs),))
+        u = given_inputs(u0, len(model.inputs))
         x = self.partition.state_of(np.nan_to_num(q), np.nan_to_num(v))
         if self.shift:
             x = x - self.shift[0] @ u
@@ -210,6 +212,7 @@ class ExactReduction:
         -------
         RecoveredMotion
         """
+        require_response(response)
         x = np.asarray(response.x, dtype=float)
         free = np.zeros((len(self.model.inputs), *x.shape[1:]))
         u = free if response.u is None else np.asarray(response.u, dtype=float)

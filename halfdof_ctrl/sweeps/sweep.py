@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
@@ -209,7 +210,7 @@ def _checked_quantities(compute: object) -> tuple[Quantity, ...]:
         return ()
     given = tuple(compute) if isinstance(compute, Sequence) and not isinstance(compute, str) else (compute,)
     functions = [quantity for quantity in given if callable(quantity)]
-    if not given or len(functions) > 1 or any(not callable(one) and one not in QUANTITIES for one in given):
+    if not given or len(functions) > 1 or any(not callable(one) and not is_choice(one, QUANTITIES) for one in given):
         msg = (
             f"compute = {compute!r}, but it must be 'poles', 'response', a function of the model, or a list of these "
             "with one function at most. Let one function give an array of all its numbers."

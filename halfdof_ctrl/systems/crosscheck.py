@@ -27,10 +27,12 @@ from halfdof_ctrl.descriptor.radau import descriptor_step_response, step_plan
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.dense_copy import complex_model_error, dense_copy
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.evaluation import quadratic_rounding
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.balanced_system import BalancedSystem
 from halfdof_ctrl.systems.check_points import check_points, moving_eigenvalues
+from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE, compare_poles
 from halfdof_ctrl.systems.second_opinion import second_opinion
 
@@ -137,6 +139,7 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     >>> crosscheck(model, mech2ss(model)).passed
     True
     """
+    model, sys = checked_model(model, "crosscheck"), checked_system(sys, "crosscheck")
     if model.is_complex:
         raise complex_model_error(model)
     model = dense_copy(

@@ -11,6 +11,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     HalfdofError,
@@ -86,7 +87,7 @@ def dss2ss(
     >>> sys.state_labels, sys.poles().real.round(9).tolist()
     (['voltage'], [-0.166666667])
     """
-    if improper not in ("refuse", "drop"):
+    if not is_choice(improper, ("refuse", "drop")):
         msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
         raise ParameterError(msg, parameter="improper", value=improper)
     if isinstance(A, SecondOrderModel):

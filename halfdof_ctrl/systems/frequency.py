@@ -21,12 +21,14 @@ from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visible_zeros
+from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
@@ -90,7 +92,7 @@ def descriptor_response(model: SecondOrderModel, omega: npt.ArrayLike | None = N
     >>> descriptor_response(spring, [1.0, 2.0]).magnitude.tolist()
     [0.25, 0.25]
     """
-    if model.is_sparse:
+    if checked_model(model, "descriptor_response").is_sparse:
         frequencies = checked_frequencies(model_frequencies(model) if omega is None else omega)
         values, frequencies = sparse_frequency_response(model, frequencies)
     else:
@@ -147,7 +149,7 @@ def frequency_response(
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
     else:
-        sys = sysdata
+        sys = checked_system(sysdata, "frequency_response", parameter="sysdata")
     if omega is None:
         form = None if model is None else working_form(model, sys.nstates)
         omega = system_frequencies(sys if form is None else energy_state_space(form), model)
@@ -270,7 +272,7 @@ def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
     """Read frequencies as a 1D array of finite numbers that are not negative [rad/s]."""
     try:
         frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
-    except (TypeError, ValueError) as cause:
+    except (TypeError, ValueError, OverflowError) as cause:
         msg = f"omega must be real numbers [rad/s]: {cause}."
         raise ParameterError(msg, parameter="omega", value=omega) from cause
     if frequencies.ndim != 1 or frequencies.size == 0 or not (np.isfinite(frequencies) & (frequencies >= 0.0)).all():

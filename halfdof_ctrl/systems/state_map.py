@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import EnergyFormError, InconsistentStateError, ParameterError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -24,8 +25,10 @@ from halfdof_ctrl.reduction.method.recovery import (
     RecoveredMotion,
     TimeResponse,
     forward_slope,
+    given_inputs,
     given_values,
     require_consistent,
+    require_response,
 )
 from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.systems.scaled_states import unit_exponents
@@ -100,7 +103,7 @@ class StateMap:
         model = self.model
         q = given_values(q0, model.dofs, "displacement")
         v = given_values({} if v0 is None else v0, model.dofs, "velocity")
-        u = np.broadcast_to(np.asarray(u0, dtype=float), (len(model.inputs),))
+        u = given_inputs(u0, len(model.inputs))
         x = self.from_q @ np.nan_to_num(q) + self.from_v @ np.nan_to_num(v)
         if self.shift:
             x = x - self.shift[0] @ u
@@ -119,6 +122,7 @@ class StateMap:
         InconsistentStateError
             The response has another number of states or inputs.
         """
+        require_response(response)
         x = np.asarray(response.x, dtype=float)
         free = np.zeros((len(self.model.inputs), *x.shape[1:]))
         u = free if response.u is None else np.asarray(response.u, dtype=float)
@@ -185,7 +189,7 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
 
 def require_kind(states: str) -> None:
     """Refuse a kind of states that there is not."""
-    if states not in KINDS:
+    if not is_choice(states, KINDS):
         msg = f"states must be one of {', '.join(map(repr, KINDS))}, not {states!r}."
         raise ParameterError(msg, parameter="states", value=states)
 

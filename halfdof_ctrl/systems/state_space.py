@@ -12,6 +12,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ImproperError,
@@ -108,7 +109,7 @@ def mech2ss(
     array([[ 0.,  1.],
            [-4.,  0.]])
     """
-    if improper not in ("refuse", "drop"):
+    if not is_choice(improper, ("refuse", "drop")):
         msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
         raise ParameterError(msg, parameter="improper", value=improper)
     require_kind(states)

@@ -18,10 +18,12 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.doors import is_choice
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.motion import places_of_dofs, with_motion_as_input
@@ -128,9 +130,7 @@ def transmissibility(
     >>> complex(transmissibility(model, "mass", "foot", 1.0, kind="force"))
     (0.8+0j)
     """
-    if kind not in TRANSMISSIBILITY_KINDS:
-        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
-        raise ParameterError(msg, parameter="kind", value=kind)
+    _require_transmissibility(kind)
     if kind == "motion":
         _require_single(to, "to", kind)
         return _shaped(_driven_response(model, from_, s, shown=to)[0].sum(axis=0), s)
@@ -198,6 +198,7 @@ def transmissibility_response(
     ParameterError
         As in `transmissibility`, or frequencies that are no finite, nonnegative numbers.
     """
+    _require_transmissibility(kind)
     held, other = (from_, to) if kind == "motion" else (to, from_)
     grid = motion_frequencies([model], held, other=other) if omega is None else omega
     frequencies = checked_frequencies(grid)
@@ -324,8 +325,15 @@ def _driven(
     return coefficients, mechss(M, C, K, dofs=dofs) if dofs else None
 
 
+def _require_transmissibility(kind: object) -> None:
+    if not is_choice(kind, TRANSMISSIBILITY_KINDS):
+        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
+        raise ParameterError(msg, parameter="kind", value=kind)
+
+
 def _at_rest(model: SecondOrderModel) -> SecondOrderModel:
     """Take DOFs out whose motion is prescribed already, which holds them at rest."""
+    checked_model(model, "dynamic_stiffness and transmissibility")
     free = [place for place, name in enumerate(model.dofs) if name not in model.prescribed]
     if not free or len(free) == len(model.dofs):
         return model

@@ -14,8 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.doors import real_numbers
+from halfdof_ctrl.base.errors import HalfdofError, ParameterError
 from halfdof_ctrl.base.names import control_label, control_labels, unknown_name_error
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -182,7 +184,7 @@ def checked_times(timepts: npt.ArrayLike) -> FloatArray:
     ParameterError
         They do not.
     """
-    given = np.asarray(timepts, dtype=float)
+    given = real_numbers(timepts, "timepts", "rising, equidistant times [s]")
     steps = np.diff(given) if given.ndim == 1 else np.zeros(0)
     if steps.size == 0 or not (np.abs(steps - steps[0]) <= EVEN_TIMES * steps[0]).all():
         msg = (
@@ -204,14 +206,14 @@ class _Plant:
 
     @classmethod
     def of(cls, model: SecondOrderModel) -> "_Plant":
-        reduction = exact_reduction(model)
+        reduction = exact_reduction(checked_model(model, "A time response"))
         sys = mech2ss(reduction)  # refuses what has no state space
         states = working_map(reduction)
         return cls(model, reduction, states, sys if states is None else system_of_map(states))
 
     def times(self, timepts: npt.ArrayLike | None, start: FloatArray | None = None) -> FloatArray:
         """Return the given times, or those that show what is seen in outputs and recovered DOFs."""
-        if timepts is not None and np.ndim(timepts) > 0:
+        if timepts is not None and real_numbers(timepts, "timepts", "times [s]").ndim > 0:
             return checked_times(timepts)
         A, B, C, D = StateSpaceData.of(self.sys)
         if not (self.model.is_sparse and len(self.model.dofs) > MOST_TIMED):
@@ -221,7 +223,7 @@ class _Plant:
         if start is not None:  # C (exp(A t) - 1) x0 is the step response to B = A x0
             B, D = (A @ start)[:, None], np.zeros((len(C), 1))
         poles: BoundedPoles | None = poles_of_model(self.model, A) if A.size else None
-        horizon = None if timepts is None else float(np.asarray(timepts))
+        horizon = None if timepts is None else float(real_numbers(timepts, "timepts", "times [s]"))
         return step_times(relevant_poles(A, B, C, D, poles), horizon)
 
     def start(self, displacement: Motion, velocity: Motion, inputs: npt.ArrayLike) -> FloatArray:
@@ -280,11 +282,11 @@ def _histories(inputs: Histories, names: tuple[str, ...], count: int) -> FloatAr
             for name, history in inputs.items():
                 if name not in names:
                     raise unknown_name_error(name, "input", names)
-                values[names.index(name)] = np.asarray(history, dtype=float)
+                values[names.index(name)] = real_numbers(history, "inputs", "histories of real numbers")
         else:
-            values[:] = np.asarray(inputs, dtype=float)
+            values[:] = real_numbers(inputs, "inputs", "histories of real numbers")
     except ValueError as cause:
-        if hasattr(cause, "names"):
+        if isinstance(cause, HalfdofError):
             raise
         msg = f"inputs must be histories of {len(names)} inputs at {count} times, ({len(names)}, {count}): {cause}."
         raise ParameterError(msg, parameter="inputs", value=None) from cause

@@ -32,6 +32,7 @@ from halfdof_ctrl.base.errors import (
     UncertainRankError,
     WeightError,
     WorkerError,
+    WrongObjectError,
 )
 from halfdof_ctrl.files.naming import naming_the_file
 
@@ -43,6 +44,7 @@ EXAMPLES: list[HalfdofError] = [
     ComplexModelError("K is complex", matrices=("K", "C")),
     SignalNameError("no such name", names=("a",)),
     ParameterError("m = -1", parameter="m", value=-1.0),
+    WrongObjectError("zeros takes a model", parameter="model", value=None),
     SingularLeadingMatrixError("W is singular", dofs=("a", "b"), rcond=1e-18),
     SingularPencilError("floats", dofs=("a",), equations=("b",)),
     UncertainRankError("close", dofs=("a",), gap=2.0),

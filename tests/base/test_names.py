@@ -72,7 +72,7 @@ def test_wrong_count_of_names_is_refused(given_names: tuple[str, ...] | str) -> 
         checked_names(given_names, 2, "inputs")
 
 
-@pytest.mark.parametrize("bad", ["", " a", "a ", "\n", 3, None, b"a", ("a",)])
+@pytest.mark.parametrize("bad", ["", " a", "a ", "\n", 3.0, True, None, b"a", ("a",)])
 def test_things_that_are_no_names_are_refused(bad: object) -> None:
     """Non-empty text without blanks at its ends."""
     with pytest.raises(SignalNameError, match="Names of inputs must be non-empty text without blanks at the ends"):

@@ -15,6 +15,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, read_only
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form
 
@@ -77,7 +78,7 @@ def port_hamiltonian(model: SecondOrderModel) -> PortHamiltonian:
     >>> port_hamiltonian(mechss([[1]], [[-3]], [[4]], dofs="y")).dofs
     ('y',)
     """
-    form = energy_form(model)
+    form = energy_form(checked_model(model, "port_hamiltonian"))
     exchanged, lost = _split(form)
     smallest = _smallest_at_unit_diagonal(np.asarray(form.model.C, dtype=float))
     is_passive = smallest >= -PASSIVE_WITHIN * len(form.model.dofs)

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import InconsistentStateError, MatrixError
+from halfdof_ctrl.base.doors import real_number, real_numbers, shown, wrong_object
+from halfdof_ctrl.base.errors import InconsistentStateError, MatrixError, ParameterError
 from halfdof_ctrl.base.names import motion_names, unknown_name_error
 
 CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
@@ -20,6 +21,19 @@ class TimeResponse(Protocol):
     t: FloatArray  #: (k,) times [s]
     x: FloatArray  #: (N, k) or (N, traces, k) states
     u: FloatArray | None  #: (m, k) or (m, traces, k) inputs, None for none
+
+
+def require_response(response: object) -> None:
+    """Refuse what is no time response with states.
+
+    Raises
+    ------
+    WrongObjectError
+        It has no times, or no states.
+    """
+    if isinstance(response, type) or any(getattr(response, part, None) is None for part in ("t", "x")):
+        remedy = "Compute it by control.forced_response of the system that mech2ss made, with its states."
+        raise wrong_object("recover", "a control.TimeResponseData", response, remedy, parameter="response")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -46,6 +60,21 @@ class RecoveredMotion:
         raise unknown_name_error(name, "motion", (*self.dofs, *motion_names(self.dofs, 1)))
 
 
+def given_inputs(given: npt.ArrayLike, count: int) -> FloatArray:
+    """Read the inputs at one time, (m,), from as many numbers or one for all.
+
+    Raises
+    ------
+    ParameterError
+        Another count, or what is no finite real number.
+    """
+    numbers = real_numbers(given, "u0", f"{count} real numbers, the inputs at that time")
+    if numbers.shape not in {(), (1,), (count,)} or not np.isfinite(numbers).all():
+        msg = f"u0 must be {count} finite numbers, the inputs at that time, or one for all, not {shown(given)}."
+        raise ParameterError(msg, parameter="u0", value=given)
+    return np.broadcast_to(numbers, (count,))
+
+
 def given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ...], what: str) -> FloatArray:
     """Read displacements or velocities as an array with NaN where they are open."""
     if isinstance(given, Mapping):
@@ -53,9 +82,9 @@ def given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ..
         for name, value in given.items():
             if name not in dofs:
                 raise unknown_name_error(name, "DOF", dofs)
-            values[dofs.index(name)] = value
+            values[dofs.index(name)] = real_number(value, f"{what} of {name}")
         return values
-    values = np.asarray(given, dtype=float)
+    values = real_numbers(given, what, f"one real number for each of the {len(dofs)} DOFs")
     if values.shape != (len(dofs),):
         msg = f"{what} must have one value for each of the {len(dofs)} DOFs, but its shape is {values.shape}."
         raise MatrixError(msg, matrix=what)

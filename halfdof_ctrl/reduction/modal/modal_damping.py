@@ -14,9 +14,11 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.doors import is_real_number
 from halfdof_ctrl.base.errors import ComplexModelError, MatrixError, ModelSizeError, ParameterError, SingularPencilError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
@@ -62,7 +64,7 @@ def with_modal_damping(model: SecondOrderModel, loss_factor: float | None = None
     >>> with_modal_damping(mechss([[2]], None, [[200]]), 0.04).C.round(12).tolist()
     [[0.8]]
     """
-    _require(model, loss_factor)
+    _require(checked_model(model, "with_modal_damping"), loss_factor)
     M, K = np.asarray(model.M), np.asarray(model.K).real
     shapes, omega = _modes(M, K, model.dofs)
     if loss_factor is None:
@@ -93,7 +95,7 @@ def _require(model: SecondOrderModel, loss_factor: float | None) -> None:
             else "Either K has imaginary parts or a loss factor is given, not both, not none: one says what is lost."
         )
         raise ComplexModelError(msg, matrices=model.complex_matrices)
-    sound = loss_factor is None or (isinstance(loss_factor, int | float) and np.isfinite(loss_factor))
+    sound = loss_factor is None or (is_real_number(loss_factor) and np.isfinite(loss_factor))
     if not sound or (loss_factor or 0.0) < 0.0:
         msg = f"loss_factor = {loss_factor!r}, but it must be a number that is not negative."
         raise ParameterError(msg, parameter="loss_factor", value=loss_factor)

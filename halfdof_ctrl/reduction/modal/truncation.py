@@ -21,6 +21,7 @@ import numpy as np
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -31,6 +32,7 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 from halfdof_ctrl.reduction.modal.craig_bampton import KEPT_MODES_MARGIN, Motions, Parts, craig_bampton
@@ -40,6 +42,7 @@ from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resona
 
 MEASURED_POINTS = 12  #: frequencies between resonances at which the error is measured
 DOUBTFUL_POINTS = 4  #: frequencies where most is expected of it, at which it is measured too
+MOST_POINTS = 1_000_000  #: more frequencies than any use
 CANDIDATES = 200  #: frequencies among which these are looked for
 MEASURING_EFFORT = 4e10  #: cubes of the small model's size that this may take
 DECADES = 2.0  #: of the band below its upper end
@@ -155,6 +158,7 @@ def truncate_modes(
     >>> small.dofs, bool(small.max_error < 0.001)
     (('q39', 'mode1', 'mode2', 'mode3', 'correction1'), True)
     """
+    checked_model(model, "truncate_modes")
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     whole = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
@@ -173,14 +177,14 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
     if (f_max is None) == (n_modes is None):
         msg = "Give either f_max, the highest frequency that matters [Hz], or n_modes, the number of modes to keep."
         raise ParameterError(msg, parameter="f_max", value=f_max)
-    if f_max is not None and not (np.isfinite(f_max) and f_max > 0.0):
-        msg = f"f_max = {f_max} Hz, but it must be a positive frequency."
+    if f_max is not None and not (is_real_number(f_max) and np.isfinite(float(f_max)) and f_max > 0.0):
+        msg = f"f_max = {shown(f_max)} Hz, but it must be a positive frequency."
         raise ParameterError(msg, parameter="f_max", value=f_max)
     if n_modes is not None and not (isinstance(n_modes, int | np.integer) and n_modes > 0):
         msg = f"n_modes = {n_modes!r}, but it must be a whole number, at least 1."
         raise ParameterError(msg, parameter="n_modes", value=n_modes)
-    if points < 1:
-        msg = f"points = {points}, but the error is to be measured at one frequency or more."
+    if not isinstance(points, int | np.integer) or not 1 <= points <= MOST_POINTS:
+        msg = f"points = {shown(points)}, but the error is to be measured at a whole number of frequencies, 1 to 1e6."
         raise ParameterError(msg, parameter="points", value=points)
 
 

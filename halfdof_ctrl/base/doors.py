@@ -1,0 +1,186 @@
+"""What every public function asks of its arguments: what was wanted, what was given, and what to do.
+
+A wrong object is refused where it enters, since further in it ends in an error that names no argument.
+"""
+
+import os
+from collections.abc import Collection, Iterable, Mapping
+from typing import Any, TypeVar
+
+import numpy as np
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import ParameterError, WrongObjectError
+
+Item = TypeVar("Item")
+
+LARGEST = int(np.finfo(float).max)  #: a Python integer has no largest one
+LONGEST_SHOWN = 60  #: characters of a wrong value in a message
+OTHER_NAMES = {"control.statesp": "control", "control.xferfcn": "control", "control.frdata": "control"}
+NAMELESS = frozenset({"builtins", "numpy"})  #: modules whose types everybody knows without them
+
+
+def described(value: object) -> str:
+    """Say what an object is, for a message.
+
+    >>> described(None), described([1]), described(float), described(1.5)
+    ('None', 'a list', 'the class float', 'the number 1.5')
+    """
+    if value is None:
+        return "None"
+    if isinstance(value, type):
+        return f"the class {value.__name__}"
+    if isinstance(value, str):
+        return f"the text {shown(value)}"
+    if isinstance(value, int | float | complex | np.number) and not isinstance(value, bool):
+        return f"the number {shown(value)}"
+    kind = type(value)
+    home = OTHER_NAMES.get(kind.__module__, kind.__module__.split(".")[0])
+    name = kind.__name__ if home in NAMELESS else f"{home}.{kind.__name__}"
+    return f"{'an' if name[0] in 'aeioAEIO' else 'a'} {name}"
+
+
+def shown(value: object) -> str:
+    """Write a value for a message, cut short; one that cannot be written, by its kind."""
+    try:
+        text = repr(value)
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is its __repr__
+        return f"<{type(value).__name__}>"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+
+
+def wrong_object(taker: str, wanted: str, value: object, remedy: str = "", *, parameter: str) -> WrongObjectError:
+    """Make the refusal of an object of another kind.
+
+    Parameters
+    ----------
+    taker : str
+        The function, or the argument, that takes it.
+    wanted : str
+        What it takes, in words.
+    value : object
+        What was given.
+    remedy : str, optional
+        What to do, a sentence.
+    parameter : str
+        Name of the argument.
+    """
+    msg = f"{taker} takes {wanted}; this is {described(value)}."
+    return WrongObjectError(f"{msg} {remedy}" if remedy else msg, parameter=parameter, value=value)
+
+
+def is_choice(value: object, choices: Collection[object]) -> bool:
+    """Return whether a value is one of some texts; an array, which compares entry by entry, is not."""
+    return isinstance(value, str) and value in choices
+
+
+def is_real_number(value: object) -> bool:
+    """Return whether a value is one real number that a float holds; neither text nor a truth value is."""
+    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return not isinstance(value, int) or abs(value) <= LARGEST
+
+
+def require_mapping(value: object, parameter: str, meaning: str) -> None:
+    """Refuse what is no mapping.
+
+    Raises
+    ------
+    WrongObjectError
+        It is none.
+    """
+    if not isinstance(value, Mapping):
+        raise wrong_object(parameter, f"a mapping {meaning}", value, parameter=parameter)
+
+
+def require_text(value: object, parameter: str) -> None:
+    """Refuse what is neither text nor None.
+
+    Raises
+    ------
+    WrongObjectError
+        It is neither.
+    """
+    if value is not None and not isinstance(value, str):
+        raise wrong_object(parameter, "text, or None", value, parameter=parameter)
+
+
+def require_switch(value: object, parameter: str) -> None:
+    """Refuse what is neither True nor False.
+
+    Raises
+    ------
+    WrongObjectError
+        It is neither.
+    """
+    if not isinstance(value, bool | np.bool_):
+        raise wrong_object(parameter, "True or False", value, parameter=parameter)
+
+
+def require_path(value: object, taker: str) -> None:
+    """Refuse what names no file.
+
+    Raises
+    ------
+    WrongObjectError
+        It is no text and no path.
+    """
+    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
+        raise wrong_object(taker, "the path of a file, a text or pathlib.Path", value, parameter="path")
+
+
+def items_of(value: Iterable[Item], taker: str, wanted: str, *, parameter: str) -> list[Item]:
+    """List the items of a collection, or refuse what has none.
+
+    Raises
+    ------
+    WrongObjectError
+        It cannot be listed.
+    """
+    try:
+        return list(value)
+    except (TypeError, OSError) as cause:  # python-control's systems raise the latter
+        raise wrong_object(taker, wanted, value, parameter=parameter) from cause
+
+
+def real_numbers(value: Any, parameter: str, meaning: str) -> FloatArray:  # noqa: ANN401  # whatever the user gave
+    """Read real numbers as an array of their own shape; NaN and Inf pass.
+
+    Parameters
+    ----------
+    value : array_like
+    parameter : str
+        Name of the argument.
+    meaning : str
+        What it must be, in words.
+
+    Raises
+    ------
+    ParameterError
+        Text, ragged lists, complex numbers or other things that are no real numbers.
+    """
+    try:
+        given = np.asarray(value)
+        numbers = given.astype(float) if given.dtype.kind in "biufO" else None
+    except (TypeError, ValueError, OverflowError) as cause:
+        msg = f"{parameter} must be {meaning}, not {shown(value)}: {cause}."
+        raise ParameterError(msg, parameter=parameter, value=value) from cause
+    if numbers is None or (given.dtype == object and any(isinstance(entry, str | bytes) for entry in given.flat)):
+        msg = f"{parameter} must be {meaning}, not {shown(value)}."
+        raise ParameterError(msg, parameter=parameter, value=value)
+    return numbers
+
+
+def real_number(value: Any, parameter: str) -> float:  # noqa: ANN401  # whatever the user gave
+    """Read one real number; NaN and Inf pass.
+
+    Raises
+    ------
+    ParameterError
+        It is none.
+    """
+    numbers = real_numbers(value, parameter, "a real number")
+    if numbers.size != 1:
+        msg = f"{parameter} must be a real number, not {shown(value)}."
+        raise ParameterError(msg, parameter=parameter, value=value)
+    return float(numbers.reshape(-1)[0])

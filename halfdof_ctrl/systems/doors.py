@@ -1,0 +1,36 @@
+"""The door for systems of python-control: what is no state space or response is refused by name."""
+
+import control
+
+from halfdof_ctrl.base.doors import wrong_object
+from halfdof_ctrl.model.second_order import SecondOrderModel
+
+
+def checked_system(value: object, function: str, *, parameter: str = "sys") -> control.StateSpace:
+    """Return a state space of python-control, or refuse what is none.
+
+    Raises
+    ------
+    WrongObjectError
+        Anything but a `control.StateSpace`.
+    """
+    if isinstance(value, control.StateSpace):
+        return value
+    remedy = "Convert it by control.ss." if isinstance(value, control.TransferFunction) else ""
+    if isinstance(value, SecondOrderModel):
+        remedy = "Convert the model by hd.mech2ss."
+    raise wrong_object(function, "a control.StateSpace", value, remedy, parameter=parameter)
+
+
+def checked_time_response(value: object, function: str) -> control.TimeResponseData:
+    """Return a time response of python-control, or refuse what is none.
+
+    Raises
+    ------
+    WrongObjectError
+        Anything but a `control.TimeResponseData`.
+    """
+    if isinstance(value, control.TimeResponseData):
+        return value
+    remedy = "Compute it by control.forced_response of the system that mech2ss made."
+    raise wrong_object(function, "a control.TimeResponseData", value, remedy, parameter="response")

@@ -1,0 +1,93 @@
+"""Every public function refuses what it cannot use by an error of this package that says what to pass."""
+
+import inspect
+import pickle
+import warnings
+from pathlib import Path
+
+import control
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import halfdof_ctrl as hd
+from support.wrong_objects import DOORS, doors, wrong_objects
+
+
+@pytest.mark.parametrize("door", DOORS)
+def test_no_wrong_object_ends_in_an_error_without_a_name(
+    door: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each argument in turn is each wrong object; no answer is a `HalfdofError`, or a missing file's OSError."""
+    monkeypatch.chdir(tmp_path)
+    function, right = doors(tmp_path)[door]
+    raw = []
+    for argument in right:
+        for what, wrong in wrong_objects().items():
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    function(**{**right, argument: wrong})
+            except hd.HalfdofError:
+                pass
+            except FileNotFoundError:
+                if argument != "path":
+                    raise
+            except Exception as error:  # noqa: BLE001  # the very thing that is looked for
+                raw.append(f"{argument} = {what}: {type(error).__name__}: {error}")
+        plt.close("all")
+    assert not raw
+
+
+def test_doors_are_called_by_arguments_that_they_have(tmp_path: Path) -> None:
+    """A wrong name of an argument would be refused by Python, and nothing would be tested."""
+    table = doors(tmp_path)
+    assert set(table) == set(DOORS)
+    for function, right in table.values():
+        assert set(right) <= set(inspect.signature(function).parameters)
+
+
+@pytest.mark.parametrize("name", ["zeros", "pencil_structure", "exact_reduction", "port_hamiltonian", "lqr"])
+def test_a_state_space_in_place_of_a_model_is_named(name: str) -> None:
+    """The message says what the function takes, and what this is."""
+    sys = hd.mech2ss(hd.hydromount())
+    with pytest.raises(TypeError, match=f"{name} takes a model of mechss; this is a control.StateSpace"):
+        getattr(hd, name)(sys)
+
+
+def test_crosscheck_with_its_arguments_swapped_is_refused() -> None:
+    """The model comes first."""
+    model = hd.hydromount()
+    with pytest.raises(hd.HalfdofError, match="crosscheck takes a model of mechss"):
+        hd.crosscheck(hd.mech2ss(model), model)
+
+
+def test_a_model_called_as_an_update_function_points_to_mech2ss() -> None:
+    """`control.ss(model)` takes the model for a function of time, state, input and parameters."""
+    with pytest.raises(hd.HalfdofError, match=r"use hd\.mech2ss"):
+        hd.hydromount()(0.0, np.zeros(4), np.zeros(3), {})
+
+
+def test_node_numbers_are_names_and_a_set_is_none() -> None:
+    """Whole numbers in a list are read as text; the order of a set changes from run to run."""
+    assert hd.mechss(np.eye(2), None, np.eye(2), dofs=[101, 102]).dofs == ("101", "102")
+    with pytest.raises(hd.HalfdofError, match="order changes from run to run"):
+        hd.mechss(np.eye(2), None, np.eye(2), dofs={"a", "b"})
+    with pytest.raises(hd.HalfdofError, match="list of texts, not a int"):
+        hd.mechss(np.eye(1), None, np.eye(1), dofs=5)
+
+
+def test_an_unknown_name_is_answered_by_the_nearest_in_a_model_of_any_size() -> None:
+    """The first names of a long list would not show it."""
+    model = hd.mechss(np.eye(60), None, np.eye(60), dofs=[f"node_{i}" for i in range(60)])
+    with pytest.raises(hd.HalfdofError, match=r"Nearest: .*node_57"):
+        model.select(outputs="nod_57")
+
+
+def test_a_feedback_comes_back_from_its_pickle() -> None:
+    """Gain and closed loop, with their labels."""
+    feedback = hd.lqr(hd.hydromount().select("F_y", "y"), displacement={"y": 1.0}, effort={"F_y": 1.0})
+    again = pickle.loads(pickle.dumps(feedback))  # noqa: S301  # of our own making
+    np.testing.assert_array_equal(again.K, feedback.K)
+    assert isinstance(again.closed_loop, control.StateSpace)
+    assert again.closed_loop.state_labels == feedback.closed_loop.state_labels
