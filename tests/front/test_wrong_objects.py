@@ -3,6 +3,7 @@
 import inspect
 import pickle
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import control
@@ -13,17 +14,26 @@ import pytest
 import halfdof_ctrl as hd
 from support.wrong_objects import DOORS, doors, wrong_objects
 
+Table = dict[str, tuple[Callable[..., object], dict[str, object]]]
+
+
+@pytest.fixture(scope="module")
+def table(tmp_path_factory: pytest.TempPathFactory) -> Table:
+    """Make the functions and their arguments once."""
+    return doors(tmp_path_factory.mktemp("doors"))
+
 
 @pytest.mark.parametrize("door", DOORS)
 def test_no_wrong_object_ends_in_an_error_without_a_name(
-    door: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    door: str, table: Table, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Each argument in turn is each wrong object; no answer is a `HalfdofError`, or a missing file's OSError."""
     monkeypatch.chdir(tmp_path)
-    function, right = doors(tmp_path)[door]
+    function, right = table[door]
     raw = []
+    wrongs = wrong_objects()
     for argument in right:
-        for what, wrong in wrong_objects().items():
+        for what, wrong in wrongs.items():
             try:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
@@ -39,9 +49,8 @@ def test_no_wrong_object_ends_in_an_error_without_a_name(
     assert not raw
 
 
-def test_doors_are_called_by_arguments_that_they_have(tmp_path: Path) -> None:
+def test_doors_are_called_by_arguments_that_they_have(table: Table) -> None:
     """A wrong name of an argument would be refused by Python, and nothing would be tested."""
-    table = doors(tmp_path)
     assert set(table) == set(DOORS)
     for function, right in table.values():
         assert set(right) <= set(inspect.signature(function).parameters)

@@ -362,9 +362,6 @@ def doors(folder: pathlib.Path) -> dict[str, tuple[Callable[..., object], dict[s
 
 #: names of the entries of `doors`, known before a folder is
 DOORS = (
-    "tuple",
-    "empty tuple",
-    "generator",
     "mechss",
     "mech2ss",
     "mech2ss of matrices",
