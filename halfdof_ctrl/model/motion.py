@@ -135,7 +135,7 @@ def places_of_dofs(model: Named, dof: Names) -> tuple[int, ...]:
     SignalNameError
         A DOF that is unknown, named twice or prescribed already; none at all.
     """
-    names = checked_names(as_tuple(dof), len(as_tuple(dof)), "DOFs")
+    names = checked_names(as_tuple(dof, "DOFs"), len(as_tuple(dof)), "DOFs")
     if not names:
         msg = "No DOF is named whose motion is to be prescribed."
         raise SignalNameError(msg, names=())
