@@ -4,13 +4,13 @@ A wrong object is refused where it enters, since further in it ends in an error 
 """
 
 import os
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.errors import ParameterError, WrongObjectError
+from halfdof_ctrl.base.errors import HalfdofError, ParameterError, WrongObjectError
 
 Item = TypeVar("Item")
 
@@ -93,6 +93,18 @@ def require_mapping(value: object, parameter: str, meaning: str) -> None:
         raise wrong_object(parameter, f"a mapping {meaning}", value, parameter=parameter)
 
 
+def require_texts(**given: object) -> None:
+    """Refuse arguments that are neither text nor None, each by its name.
+
+    Raises
+    ------
+    WrongObjectError
+        One is neither.
+    """
+    for parameter, value in given.items():
+        require_text(value, parameter)
+
+
 def require_text(value: object, parameter: str) -> None:
     """Refuse what is neither text nor None.
 
@@ -103,6 +115,18 @@ def require_text(value: object, parameter: str) -> None:
     """
     if value is not None and not isinstance(value, str):
         raise wrong_object(parameter, "text, or None", value, parameter=parameter)
+
+
+def require_switches(**given: object) -> None:
+    """Refuse arguments that are neither True nor False, each by its name.
+
+    Raises
+    ------
+    WrongObjectError
+        One is neither.
+    """
+    for parameter, value in given.items():
+        require_switch(value, parameter)
 
 
 def require_switch(value: object, parameter: str) -> None:
@@ -127,6 +151,33 @@ def require_path(value: object, taker: str) -> None:
     """
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise wrong_object(taker, "the path of a file, a text or pathlib.Path", value, parameter="path")
+
+
+def answer_of(function: Callable[..., Any], *arguments: object, parameter: str, meaning: str) -> Any:  # noqa: ANN401
+    """Call a function of the user's; what it raises becomes the cause of a refusal that says which function it is.
+
+    Parameters
+    ----------
+    function : callable
+    *arguments
+        What it is called with.
+    parameter : str
+        Name of the argument by which it was given.
+    meaning : str
+        What it is a function of, and what it must give, in words.
+
+    Raises
+    ------
+    ParameterError
+        The function failed.
+    """
+    try:
+        return function(*arguments)
+    except HalfdofError:
+        raise
+    except Exception as cause:
+        msg = f"{parameter} is called as {meaning}; this failed: {type(cause).__name__}: {cause}."
+        raise ParameterError(msg, parameter=parameter, value=function) from cause
 
 
 def items_of(value: Iterable[Item], taker: str, wanted: str, *, parameter: str) -> list[Item]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import real_numbers
+from halfdof_ctrl.base.doors import answer_of, real_numbers
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.names import unknown_name_error
 
@@ -152,15 +152,15 @@ def _of_functions(parts: list[Any], every: Callable[[float], Any] | None, times:
         for part in parts
     ]
 
+    def answers(t: float) -> FloatArray:
+        if every is not None:
+            return real_numbers(every(t), "inputs(t)", f"{m} numbers").reshape(-1)
+        return np.array([float(np.asarray(piece(t)).reshape(-1)[0]) for piece in pieces])
+
+    meaning = f"a function of the time alone that gives {m} numbers"
+
     def at(t: float) -> FloatArray:
-        try:
-            if every is not None:
-                values = real_numbers(every(t), "inputs(t)", f"{m} numbers").reshape(-1)
-            else:
-                values = np.array([float(np.asarray(piece(t)).reshape(-1)[0]) for piece in pieces])
-        except TypeError as cause:
-            msg = f"inputs is called with the time alone, and must give {m} numbers; this failed: {cause}."
-            raise ParameterError(msg, parameter="inputs", value=t) from cause
+        values: FloatArray = answer_of(answers, t, parameter="inputs", meaning=meaning)
         if values.size != m or not np.isfinite(values).all():
             msg = f"inputs(t) gives {values} at t = {t:.6g} s, but must give {m} finite numbers."
             raise ParameterError(msg, parameter="inputs", value=t)

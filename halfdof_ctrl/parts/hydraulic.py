@@ -25,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from halfdof_ctrl.base.doors import is_choice, shown, wrong_object
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.mechss import mechss
@@ -123,6 +124,8 @@ def hydraulic_mount(
     area = checked(A, "A", "m^2", positive=True)
     ways = [_way(I, R, "I", "R")]
     if decoupler is not None:
+        if not isinstance(decoupler, Decoupler):
+            raise wrong_object("decoupler", "a Decoupler, or None", decoupler, parameter="decoupler")
         ways.append(_way(decoupler.I, decoupler.R, "decoupler.I", "decoupler.R"))
     chambers = [checked(C1, "C1", "m^5/N", positive=True), checked(C2, "C2", "m^5/N", positive=True)]
     nodes = [axis_name(node, axis) for node in ("top", "bottom") for axis in found]
@@ -162,7 +165,7 @@ def _fluid_axis(axes: tuple[str, ...], wanted: str | None) -> str:
     if wanted is None and len(axes) == 1:
         return axes[0]
     axis = "z" if wanted is None else wanted
-    if axis not in axes:
-        msg = f"fluid_axis = {wanted!r}, but the rubber has the axes {listed(axes)}. Name one of them."
+    if not is_choice(axis, axes):
+        msg = f"fluid_axis = {shown(wanted)}, but the rubber has the axes {listed(axes)}. Name one of them."
         raise ParameterError(msg, parameter="fluid_axis", value=wanted)
     return axis

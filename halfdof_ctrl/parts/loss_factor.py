@@ -24,7 +24,7 @@ from scipy.sparse import csc_array, diags_array, kron
 from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix, read_only
-from halfdof_ctrl.base.doors import is_choice, is_real_number, real_numbers, shown
+from halfdof_ctrl.base.doors import answer_of, is_choice, is_real_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -193,11 +193,8 @@ def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> 
         return lambda omega: np.full(np.shape(omega), eta), True
     loss = loss_factor if callable(loss_factor) else _tabulated(loss_factor, band)
     omega = band_points(band)
-    try:
-        values = real_numbers(loss(omega), "loss_factor", "one positive number for each frequency")
-    except TypeError as cause:
-        msg = f"loss_factor is called with the frequencies [rad/s] alone, and this failed: {cause}."
-        raise ParameterError(msg, parameter="loss_factor", value=loss_factor) from cause
+    answer = answer_of(loss, omega, parameter="loss_factor", meaning="a function of the frequencies [rad/s] alone")
+    values = real_numbers(answer, "loss_factor", "one positive number for each frequency")
     if values.shape != omega.shape or not (np.isfinite(values) & (values > 0.0)).all():
         msg = "loss_factor must give one positive number for each frequency of the band."
         raise ParameterError(msg, parameter="loss_factor", value=None)

@@ -108,7 +108,6 @@ def finished_plot(
     legend = draw_legend(axes, own=own)
     name = system.name or ""
     made_up = name.startswith("sys[") and name.endswith("]")
-    require_text(title, "title")
     if title is None and own and not made_up:
         title = plain(name_from_label(name))
     if title:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MultipleLocator
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray
+from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import (
     NoStateSpaceError,
     ParameterError,
@@ -146,7 +147,11 @@ def bode_plot(
     ('|y/F_y| [m/N]', 'frequency [Hz]')
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title, label=label)
+    require_switches(dB=dB, Hz=Hz, deg=deg, grid=grid)
     curve, kind, reference = _curve(sysdata, omega, reference)
+    named = sysdata if reference is None else reference
+    known = known_units(named, units)
     p, m = curve.noutputs, curve.ninputs
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
@@ -168,8 +173,7 @@ def bode_plot(
             style = {"label": prefix + "descriptor form", "markersize": 5.0, **CIRCLE}
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
             lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase[marks])), **style)
-    named = sysdata if reference is None else reference
-    dress_bode(axes, curve, sysdata, known_units(named, units), scales, grid=grid)
+    dress_bode(axes, curve, sysdata, known, scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 

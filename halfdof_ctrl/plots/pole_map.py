@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Circle
 
 from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.structure import pencil_structure
@@ -85,6 +86,8 @@ def pole_map_plot(
     '2 infinite eigenvalues deflated'
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title, label=label)
+    require_switches(grid=grid)
     _require_feedback(feedback)
     marks = _marks(sysdata, feedback)
     axes = prepared_axes(ax, (1, 1), "a single one for the s-plane", height=4.8)

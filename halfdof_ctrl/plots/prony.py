@@ -5,6 +5,7 @@ from typing import cast
 import control
 import numpy as np
 
+from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.parts.prony import PronyFit, counted
 from halfdof_ctrl.plots.axes import AxesLike, draw_grid, draw_legend, label_y, no_lines, prepared_axes
@@ -53,6 +54,8 @@ def prony_plot(
     if not isinstance(cast("object", fit), PronyFit):
         msg = f"prony_plot draws what fit_prony returned, not a {type(fit).__name__}."
         raise ParameterError(msg, parameter="fit", value=fit)
+    require_texts(title=title, unit=unit)
+    require_switches(grid=grid)
     axes = prepared_axes(ax, (2, 1), "real and imaginary part in rows", height=4.2)
     f = np.geomspace(fit.frequency[0], fit.frequency[-1], CURVE_POINTS)
     curves = [(counted(fit.k.size), fit(f), "-")]

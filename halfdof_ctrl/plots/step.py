@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import (
     AxesArray,
@@ -85,6 +86,8 @@ def step_plot(
     ['y [m]', 'displacement [m]']
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title, label=label)
+    require_switches(grid=grid)
     require_system(sysdata)
     known = known_units(sysdata, units)
     reduction: ExactReduction | None = None

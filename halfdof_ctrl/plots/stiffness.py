@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -111,6 +112,8 @@ def dynamic_stiffness_plot(
     ['dynamic stiffness\nat y [N/m]', 'loss angle [deg]']
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title)
+    require_switches(Hz=Hz, dB=dB, grid=grid)
     models, texts = _models(sysdata, label)
     _require_scales(xscale, yscale)
     if omega is None:
@@ -174,6 +177,8 @@ def transmissibility_plot(
     'transmissibility\n|y2/y| [-]'
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title)
+    require_switches(Hz=Hz, dB=dB, grid=grid)
     models, texts = _models(sysdata, label)
     _require_scales(xscale, yscale)
     if omega is None:

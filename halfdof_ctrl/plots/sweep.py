@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.base.doors import require_mapping, require_text, wrong_object
+from halfdof_ctrl.base.doors import require_mapping, require_switches, require_texts, wrong_object
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.model.mechss import mechss
@@ -101,6 +101,8 @@ def sweep_plot(
     ['C_h = 100', 'C_h = 300', 'C_h = 900']
     >>> plt.close(cplt.figure)
     """
+    require_texts(title=title)
+    require_switches(dB=dB, Hz=Hz, deg=deg, grid=grid)
     wanted = _checked_kind(result, kind)
     cases = coloured_cases(result, parameter, at)
     if wanted == "bode":
@@ -109,7 +111,6 @@ def sweep_plot(
         lines, axes = _draw_poles(result, cases, ax, grid=grid)
     cases.draw_bar(axes, units)
     legend = draw_legend(axes, own=ax is None)
-    require_text(title, "title")
     if title:
         draw_title(axes, title, own=ax is None)
     return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)
@@ -138,6 +139,7 @@ def _draw_curves(
 ) -> tuple[AxesArray, AxesArray]:
     """Draw magnitude and phase of every case."""
     p, m = len(result.outputs), len(result.inputs)
+    known = _signal_units(result, units)
     what = f"magnitude and phase of {p} outputs in rows, {m} inputs in columns"
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     omega, lines = np.asarray(result.omega), no_lines(axes)
@@ -152,7 +154,7 @@ def _draw_curves(
     named = control.FrequencyResponseData(
         largest, omega, inputs=list(control_labels(result.inputs)), outputs=list(control_labels(result.outputs))
     )
-    dress_bode(axes, named, named, _signal_units(result, units), scales, grid=grid)
+    dress_bode(axes, named, named, known, scales, grid=grid)
     return lines, axes
 
 

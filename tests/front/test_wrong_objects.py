@@ -5,6 +5,7 @@ import pickle
 import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import control
 import matplotlib.pyplot as plt
@@ -13,6 +14,26 @@ import pytest
 
 import halfdof_ctrl as hd
 from support.wrong_objects import DOORS, doors, wrong_objects
+
+#: results and models, which functions make; none is called by a user
+MADE_BY_FUNCTIONS = {
+    "CrossCheck",
+    "DescriptorForm",
+    "DescriptorSystem",
+    "ExactReduction",
+    "HalfdofError",
+    "MaxwellDampedModel",
+    "NonlinearModel",
+    "PencilStructure",
+    "PortHamiltonian",
+    "PronyFit",
+    "SecondOrderModel",
+    "StateFeedback",
+    "StateMap",
+    "SweepFailure",
+    "SweepResult",
+    "TruncatedModel",
+}
 
 Table = dict[str, tuple[Callable[..., object], dict[str, object]]]
 
@@ -56,6 +77,12 @@ def test_doors_are_called_by_arguments_that_they_have(table: Table) -> None:
         assert set(right) <= set(inspect.signature(function).parameters)
 
 
+def test_every_public_function_is_in_the_table(table: Table) -> None:
+    """What is not is a class whose objects this package makes, or the base of the errors."""
+    missing = {name for name in hd.__all__ if name not in table}
+    assert missing == MADE_BY_FUNCTIONS
+
+
 @pytest.mark.parametrize("name", ["zeros", "pencil_structure", "exact_reduction", "port_hamiltonian", "lqr"])
 def test_a_state_space_in_place_of_a_model_is_named(name: str) -> None:
     """The message says what the function takes, and what this is."""
@@ -73,17 +100,21 @@ def test_crosscheck_with_its_arguments_swapped_is_refused() -> None:
 
 def test_a_model_called_as_an_update_function_points_to_mech2ss() -> None:
     """`control.ss(model)` takes the model for a function of time, state, input and parameters."""
+    update: Any = hd.hydromount()
     with pytest.raises(hd.HalfdofError, match=r"use hd\.mech2ss"):
-        hd.hydromount()(0.0, np.zeros(4), np.zeros(3), {})
+        update(0.0, np.zeros(4), np.zeros(3), {})
 
 
 def test_node_numbers_are_names_and_a_set_is_none() -> None:
     """Whole numbers in a list are read as text; the order of a set changes from run to run."""
-    assert hd.mechss(np.eye(2), None, np.eye(2), dofs=[101, 102]).dofs == ("101", "102")
+    numbers: Any = [101, 102]
+    unordered: Any = {"a", "b"}
+    single: Any = 5
+    assert hd.mechss(np.eye(2), None, np.eye(2), dofs=numbers).dofs == ("101", "102")
     with pytest.raises(hd.HalfdofError, match="order changes from run to run"):
-        hd.mechss(np.eye(2), None, np.eye(2), dofs={"a", "b"})
+        hd.mechss(np.eye(2), None, np.eye(2), dofs=unordered)
     with pytest.raises(hd.HalfdofError, match="list of texts, not a int"):
-        hd.mechss(np.eye(1), None, np.eye(1), dofs=5)
+        hd.mechss(np.eye(1), None, np.eye(1), dofs=single)
 
 
 def test_an_unknown_name_is_answered_by_the_nearest_in_a_model_of_any_size() -> None:
