@@ -76,6 +76,8 @@ def is_choice(value: object, choices: Collection[object]) -> bool:
 
 def is_real_number(value: object) -> bool:
     """Return whether a value is one real number that a float holds; neither text nor a truth value is."""
+    if type(value) is float:  # the usual case at once
+        return True
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
         return False
     return not isinstance(value, int) or abs(value) <= LARGEST

@@ -61,7 +61,8 @@ def test_model_goes_through_selection_unchanged() -> None:
         ({"outputs": ()}, "No output is selected"),
         ({"outputs": ""}, "No output is selected|must be non-empty"),
         ({"inputs": ["y"]}, "The model has no input 'y'"),
-        ({"inputs": [0]}, "must be non-empty text"),
+        ({"inputs": [0]}, "The model has no input '0'"),
+        ({"inputs": [0.5]}, "Names must be non-empty text .*, not a float"),
     ],
 )
 def test_selection_of_unknown_names_is_refused(options: dict[str, object], words: str) -> None:
