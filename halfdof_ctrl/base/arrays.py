@@ -34,7 +34,7 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
     Parameters
     ----------
     value : array_like or scipy sparse array
-        Two-dimensional, or one-dimensional where `shape` shows a single row or column.
+        Two-dimensional, or one-dimensional where `shape` shows a single row or column, or a number where it shows one.
     letter : str
         The matrix's letter in ``M q'' + C q' + K q = B u`` and ``y = F q + G q' + H q'' + D u``.
     shape : (int, int), optional
@@ -52,7 +52,7 @@ def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = N
         sparse matrix too large to be held dense.
     """
     array = _numbers(value, letter)
-    if shape is not None and array.ndim == 1:
+    if shape is not None and array.ndim < MATRIX_DIMENSIONS:
         array = _as_row_or_column(array, shape)
     require_shape(array.shape, letter, shape)
     if not np.logical_and.reduce(np.isfinite(array), axis=None):
@@ -80,8 +80,10 @@ def require_shape(found: tuple[int, ...], letter: str, shape: tuple[int, int] | 
         raise MatrixError(msg, matrix=letter)
 
 
-def checked_square_matrices(values: Sequence[object], letters: str) -> list[DenseMatrix]:
+def checked_square_matrices(values: Sequence[object], letters: str, rows: str = "DOFs") -> list[DenseMatrix]:
     """Copy square matrices of one size into read-only ones, as `checked_matrix` does; None becomes zeros.
+
+    A vector is a diagonal matrix, the number 0 a matrix of zeros, and any number a matrix where there is but one row.
 
     Raises
     ------
@@ -94,14 +96,94 @@ def checked_square_matrices(values: Sequence[object], letters: str) -> list[Dens
             return together
     size: tuple[int, int] | None = None
     checked: list[DenseMatrix | None] = []
-    for letter, value in zip(letters, values, strict=True):
-        checked.append(None if value is None else checked_matrix(value, letter, size))
+    for letter, value in zip(letters, without_short_forms(values, letters, rows=rows), strict=True):
+        checked.append(None if value is None else checked_matrix(full_square(value), letter, size))
         if size is None and checked[-1] is not None:
             size = (checked[-1].shape[0], checked[-1].shape[1])
-    if size is None:
+    size = size or (1, 1)  # nothing but the number 0
+    return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
+
+
+def without_short_forms(
+    values: Sequence[object], letters: Sequence[str], size: int | None = None, rows: str = "DOFs"
+) -> list[object]:
+    """Write numbers and vectors in place of square matrices as the matrices that they stand for.
+
+    Parameters
+    ----------
+    values : sequence of objects
+        Matrices, vectors for diagonal ones, numbers (0 for a matrix of zeros, any where there is one row), None.
+    letters : sequence of str
+    size : int, optional
+        Rows of the matrices; by default those of the first matrix, else of the first vector.
+    rows : str
+        What the rows are, for the message.
+
+    Returns
+    -------
+    list
+        Matrices as they were given, 1D arrays for diagonal ones, None for None and 0.
+
+    Raises
+    ------
+    MatrixError
+        All are None, a vector of another length, or a number that is not 0 where there are several rows.
+
+    Examples
+    --------
+    >>> without_short_forms([[2, 0], 0, [[1, 0], [0, 1]]], "MCK")
+    [array([2., 0.]), None, [[1, 0], [0, 1]]]
+    >>> without_short_forms([2, None, 8], "MCK")
+    [array([2.]), None, array([8.])]
+    """
+    if all([value is None for value in values]):  # noqa: C419  # a list is faster for three
         msg = f"{', '.join(letters)} are all None: a model needs at least one of them."
         raise MatrixError(msg, matrix=letters[-1])
-    return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
+    shapes = [_shape(value) for value in values]
+    sizes = [*(shape[0] for shape in shapes if len(shape) > 1), *(shape[0] for shape in shapes if len(shape) == 1)]
+    n = size or next(iter(sizes), 1)
+    return [
+        value if len(shape) > 1 else _diagonal(value, letter, n, rows)
+        for letter, value, shape in zip(letters, values, shapes, strict=True)
+    ]
+
+
+def is_zero_number(value: object) -> bool:
+    """Return whether a value is the number 0, of any type; a matrix of zeros is none."""
+    if isinstance(value, np.ndarray):
+        return value.ndim == 0 and bool(value == 0)
+    return np.isscalar(value) and bool(value == 0)
+
+
+def full_square(value: object) -> object:
+    """Make the matrix that a vector of `without_short_forms` stands for."""
+    return np.diag(value) if isinstance(value, np.ndarray) and value.ndim == 1 else value
+
+
+def _diagonal(value: object, letter: str, size: int, rows: str) -> object:
+    """Read a vector or a number as the diagonal matrix that it stands for; None for None and 0."""
+    diagonal = np.zeros(()) if value is None else _numbers(value, letter)
+    if diagonal.ndim > 1:  # of an object that tells its shape but as an array
+        return value
+    if diagonal.ndim == 0 and diagonal == 0:
+        return None
+    if diagonal.size != size:
+        what = "a single number" if diagonal.ndim == 0 else f"a vector of {diagonal.size} numbers"
+        msg = (
+            f"{letter} is {what}, and there are {size} {rows}. Give a square matrix, or for a diagonal one a vector "
+            "with a number for each."
+        )
+        raise MatrixError(msg, matrix=letter)
+    return diagonal.reshape(-1)
+
+
+def _shape(value: object) -> tuple[int, ...]:
+    """Return the shape of what may be a matrix, and that of a matrix without entries for what has none."""
+    try:
+        shape = np.shape(value)  # type: ignore[arg-type]  # of whatever was given
+    except (TypeError, ValueError):
+        return (0, 0)
+    return shape if isinstance(shape, tuple) else (0, 0)
 
 
 def zero_matrix(rows: int, columns: int) -> FloatArray:
@@ -142,8 +224,8 @@ def _numbers(value: object, letter: str) -> DenseMatrix:
         array = np.array(value)
         if array.dtype == REAL:
             return array
-        if array.dtype.kind == "O" and any(isinstance(entry, str | bytes) for entry in array.flat):
-            msg = "it holds text"
+        if array.dtype.kind == "O" and any(entry is None or isinstance(entry, str | bytes) for entry in array.flat):
+            msg = "it holds text or None"
             raise TypeError(msg)  # noqa: TRY301  # told like the other conversions that fail
         if array.dtype.kind in "biufO":
             return array.astype(np.float64)

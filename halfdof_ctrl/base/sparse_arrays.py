@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import coo_array, csc_array, csr_array, eye_array, issparse
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array, issparse
 
 from halfdof_ctrl.base.arrays import (
     MATRIX_DIMENSIONS,
@@ -21,6 +21,7 @@ from halfdof_ctrl.base.arrays import (
     read_only,
     require_shape,
     unit_matrix,
+    without_short_forms,
     zero_matrix,
 )
 from halfdof_ctrl.base.errors import MatrixError
@@ -103,8 +104,10 @@ def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | N
     return _locked(matrix.astype(np.complex128 if matrix.dtype.kind == "c" else REAL, copy=False))
 
 
-def checked_sparse_squares(values: Sequence[object], letters: str) -> list[SparseMatrix]:
+def checked_sparse_squares(values: Sequence[object], letters: str, rows: str = "DOFs") -> list[SparseMatrix]:
     """Copy square matrices of one size, of which some are sparse, into sparse ones; None becomes zeros.
+
+    Numbers and vectors stand for what they do in `arrays.without_short_forms`.
 
     Raises
     ------
@@ -114,9 +117,14 @@ def checked_sparse_squares(values: Sequence[object], letters: str) -> list[Spars
     shape = next(np.shape(cast("Any", value)) for value in values if issparse(value))
     require_shape(shape, next(letter for letter, value in zip(letters, values, strict=True) if issparse(value)), None)
     return [
-        sparse_zeros(*shape) if value is None else checked_sparse_matrix(value, letter, (shape[0], shape[1]))
-        for letter, value in zip(letters, values, strict=True)
+        sparse_zeros(*shape) if value is None else checked_sparse_matrix(_square(value), letter, (shape[0], shape[1]))
+        for letter, value in zip(letters, without_short_forms(values, letters, rows=rows), strict=True)
     ]
+
+
+def _square(value: object) -> object:
+    """Make the matrix that a vector of `without_short_forms` stands for."""
+    return diags_array(value) if isinstance(value, np.ndarray) and value.ndim == 1 else value
 
 
 def sparse_zeros(rows: int, columns: int) -> SparseMatrix:

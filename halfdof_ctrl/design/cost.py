@@ -3,14 +3,15 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
+from halfdof_ctrl.base.arrays import FloatArray, checked_matrix, full_square, is_zero_number, without_short_forms
 from halfdof_ctrl.base.doors import is_real_number, shown, wrong_object
 from halfdof_ctrl.base.errors import ImproperError, WeightError
+from halfdof_ctrl.base.labelled import has_labels, without_labels
 from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -18,6 +19,8 @@ from halfdof_ctrl.systems.state_space import mech2ss
 
 Weights: TypeAlias = Mapping[str, float] | None
 
+#: what rows and columns of the matrices are, by letter
+AXES = {"Q": ("states", "states"), "R": ("inputs", "inputs"), "N": ("states", "inputs")}
 INDEFINITE = 1e-10  #: eigenvalues of a scaled cost matrix below minus this are no rounding
 UNSYMMETRIC_WEIGHTS = 1e-12  #: relative difference between a matrix and its transpose that is no rounding
 
@@ -47,10 +50,15 @@ def given_cost(
     if Q is None or R is None:
         msg = "Q and R are both needed where matrices are given; physical weights need neither."
         raise WeightError(msg, names=("Q",) if Q is None else ("R",))
+    if has_labels((Q, R, N)):
+        names = {"states": reduction.states, "inputs": reduction.model.inputs}
+        matrices, _ = without_labels({"Q": Q, "R": R, "N": N}, AXES, names)
+        plain: dict[str, Any] = matrices
+        Q, R, N = plain["Q"], plain["R"], plain["N"]
     cost = Cost(
-        checked_matrix(Q, "Q", (n, n)),
-        checked_matrix(R, "R", (m, m)),
-        np.zeros((n, m)) if N is None else checked_matrix(N, "N", (n, m)),
+        _square(Q, "Q", n, "states"),
+        _square(R, "R", m, "inputs"),
+        np.zeros((n, m)) if N is None or is_zero_number(N) else checked_matrix(N, "N", (n, m)),
     )
     for letter, matrix in (("Q", cost.Q), ("R", cost.R), ("N", cost.N)):
         if np.iscomplexobj(matrix) or (letter != "N" and not _is_symmetric(matrix)):
@@ -59,6 +67,14 @@ def given_cost(
             raise WeightError(msg, names=(letter,))
     _require_convex(cost, reduction.model.inputs)
     return cost
+
+
+def _square(value: object, letter: str, size: int, rows: str) -> FloatArray:
+    """Read a weighting matrix, a vector for a diagonal one, or a number for all of the diagonal."""
+    if is_real_number(value):
+        value = np.full(size, value)
+    full = full_square(without_short_forms((value,), (letter,), size, rows)[0])
+    return checked_matrix(np.zeros((size, size)) if full is None else full, letter, (size, size))
 
 
 def checked_weights(model: SecondOrderModel, motions: list[Weights], energy: float | None) -> PhysicalWeights:

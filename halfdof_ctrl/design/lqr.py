@@ -171,7 +171,8 @@ def lqr(
     model : SecondOrderModel
         Its inputs are the actuators; choose them with `select`.
     Q, R, N : (N, N), (m, m), (N, m) array_like, optional
-        Weights of ``x^T Q x + u^T R u + 2 x^T N u``, as in `control.lqr`, on the states of `exact_reduction`.
+        Weights of ``x^T Q x + u^T R u + 2 x^T N u``, as in `control.lqr`, on the states of `exact_reduction`. For Q and
+        R a vector is a diagonal matrix, and a number the weight of each state or input; labels are aligned.
     displacement, velocity, acceleration : mapping from DOF to weight, optional
         Weights of the squares of any DOF's motion [1/m^2, s^2/m^2, s^4/m^2], none negative.
     effort : mapping from input to weight, optional

@@ -12,11 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import Matrix, checked_matrix, unit_matrix
+from halfdof_ctrl.base.arrays import (
+    Matrix,
+    checked_matrix,
+    checked_square_matrices,
+    is_zero_number,
+    unit_matrix,
+)
+from halfdof_ctrl.base.errors import MatrixError
+from halfdof_ctrl.base.labelled import has_labels, without_labels
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import (
     MatrixLike,
     checked_sparse_matrix,
+    checked_sparse_squares,
     filled_rows,
     has_sparse,
     is_sparse,
@@ -24,6 +33,15 @@ from halfdof_ctrl.base.sparse_arrays import (
 )
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
+
+#: what rows and columns of the matrices are, by letter
+AXES = {
+    "A": ("variables", "variables"),
+    "B": ("variables", "inputs"),
+    "C": ("outputs", "variables"),
+    "D": ("outputs", "inputs"),
+    "E": ("variables", "variables"),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -64,7 +82,8 @@ def dss(
     Parameters
     ----------
     A, E : (n, n) array_like, scipy sparse array or matrix
-        E may be singular; None for the unit matrix.
+        E may be singular; None for the unit matrix. Numbers, vectors and labelled matrices (DataFrames) are read as
+        `mechss` reads them.
     B : (n, m) array_like or sparse
         A 1D array of length n is one input.
     C : (p, n) array_like or sparse
@@ -99,14 +118,22 @@ def dss(
       inputs:    u[0]
       outputs:   voltage
     """
+    if has_labels((A, B, C, D, E)):
+        names_of_kinds = {"variables": states, "inputs": inputs, "outputs": outputs}
+        matrices, named = without_labels({"A": A, "B": B, "C": C, "D": D, "E": E}, AXES, names_of_kinds)
+        plain: dict[str, Any] = matrices
+        return dss(**plain, states=named["variables"], inputs=named["inputs"], outputs=named["outputs"], name=name)
+    if A is None:
+        msg = "A is None, and no number stands for it: give the matrix A."
+        raise MatrixError(msg, matrix="A")
     sparse = has_sparse((A, E))
-    square = checked_sparse_matrix(A, "A") if sparse else checked_matrix(A, "A")
+    square, leading = (checked_sparse_squares if sparse else checked_square_matrices)((A, E), "AE", "variables")
     n = square.shape[0]
-    leading = _unit(square) if E is None else _checked(E, "E", (n, n), sparse=sparse)
+    leading = _unit(square) if E is None else leading
     columns = _checked(B, "B", (n, _count(B, n, 1)), sparse=sparse)
     rows = _checked(C, "C", (_count(C, n, 0), n), sparse=sparse)
     m, p = columns.shape[1], rows.shape[0]
-    direct = None if D is None or (np.isscalar(D) and D == 0) else _checked(D, "D", (p, m), sparse=sparse)
+    direct = None if D is None or is_zero_number(D) else _checked(D, "D", (p, m), sparse=sparse)
     stiffness = -square if is_sparse(square) else 0.0 - square
     model = mechss(
         None, leading, stiffness, columns, rows,

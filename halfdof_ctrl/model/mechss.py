@@ -1,7 +1,7 @@
 """The door: `mechss` checks matrices and names once and returns a `SecondOrderModel`."""
 
 from collections.abc import Sequence
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -12,8 +12,11 @@ from halfdof_ctrl.base.arrays import (
     ModelMatrix,
     checked_matrix,
     checked_square_matrices,
+    is_zero_number,
 )
 from halfdof_ctrl.base.doors import require_text
+from halfdof_ctrl.base.errors import MatrixError
+from halfdof_ctrl.base.labelled import has_labels, without_labels
 from halfdof_ctrl.base.names import (
     DERIVATIVE_SUFFIXES,
     FORCE_PREFIX,
@@ -35,6 +38,14 @@ from halfdof_ctrl.base.sparse_arrays import (
     zeros_like,
 )
 from halfdof_ctrl.model.second_order import SecondOrderModel
+
+#: what rows and columns of the matrices are, by letter
+AXES = (
+    dict.fromkeys(("M", "C", "K"), ("DOFs", "DOFs"))
+    | dict.fromkeys(("B", "Bv", "Ba"), ("DOFs", "inputs"))
+    | dict.fromkeys(("F", "G", "H"), ("outputs", "DOFs"))
+    | dict.fromkeys(("D", "Dv", "Da"), ("outputs", "inputs"))
+)
 
 
 def mechss(
@@ -63,7 +74,9 @@ def mechss(
     M, C, K : (n, n) array_like, scipy sparse array or matrix, or None
         Mass [kg], damping [N s/m] and stiffness [N/m]; None for a matrix of zeros, but not all three.
         They may be singular, unsymmetric or complex (structural damping). If one of them is sparse, the model is: all
-        its matrices are kept in compressed columns, and nothing of n x n entries is ever formed.
+        its matrices are kept in compressed columns, and nothing of n x n entries is ever formed. A vector is a diagonal
+        matrix, 0 a matrix of zeros, and with one DOF numbers will do. Labelled matrices (DataFrames of pandas) are
+        aligned by their labels, which name the DOFs, and inputs and outputs too.
     B : (n, m) array_like or sparse, optional
         Forces per input [N]; by default a unit force on every DOF, named ``F_<dof>``. A 1D array of
         length n is one input.
@@ -77,7 +90,7 @@ def mechss(
     Dv, Da : (p, m) array_like, optional
         Direct terms of the first and second derivative of the inputs.
     dofs, inputs, outputs : str or sequence of str, optional
-        Names. By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
+        Names; whole numbers in a list, such as those of nodes, are read as text. By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
         motion ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``, and any other signal ``u[0]``, ``y[0]``, ...
     name : str, optional
         Name of the model.
@@ -92,7 +105,7 @@ def mechss(
         A matrix of wrong shape, empty, of things that are no numbers, with NaN or Inf.
     SignalNameError
         Names that are too many or too few, twice the same, or that name a DOF's force or motion
-        while the matrices say something else.
+        while the matrices say something else; labels of matrices that do not match.
 
     Examples
     --------
@@ -106,6 +119,12 @@ def mechss(
       outputs: mass, joint
     """
     require_text(name, "name")
+    given = (M, C, K, B, Bv, Ba, F, G, H, D, Dv, Da)
+    if has_labels(given):
+        names_of_kinds = {"DOFs": dofs, "inputs": inputs, "outputs": outputs}
+        matrices, named = without_labels(dict(zip(AXES, given, strict=True)), AXES, names_of_kinds)
+        plain: dict[str, Any] = matrices
+        return mechss(**plain, dofs=named["DOFs"], inputs=named["inputs"], outputs=named["outputs"], name=name)
     M, C, K = (checked_sparse_squares if has_sparse((M, C, K)) else checked_square_matrices)((M, C, K), "MCK")
     n = M.shape[0]
     names = tuple([f"q{index}" for index in range(n)]) if dofs is None else checked_dofs(dofs, n)
@@ -155,6 +174,21 @@ def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int
     return default
 
 
+def _require_orientation(found: tuple[int, ...], letter: str, rows: int, columns: int) -> None:
+    """Refuse a matrix whose transpose would do, and say that."""
+    if len(found) != MATRIX_DIMENSIONS or found == (rows, columns):
+        return
+    if letter[0] == "D":
+        wrong, needed = found == (columns, rows), "a row for each output and a column for each input"
+    elif letter[0] == "B":
+        wrong, needed = found[0] != rows and found[1] == rows, "a row for each DOF"
+    else:
+        wrong, needed = found[1] != columns and found[0] == columns, "a column for each DOF"
+    if wrong:
+        msg = f"{letter} needs {needed}; transpose it. It is {found[0]} x {found[1]}."
+        raise MatrixError(msg, matrix=letter)
+
+
 def _shape(value: MatrixLike) -> tuple[int, ...]:
     """Return the shape of a matrix; that of what is none is left to the check of the matrix itself."""
     try:
@@ -166,8 +200,9 @@ def _shape(value: MatrixLike) -> tuple[int, ...]:
 
 def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: ModelMatrix) -> ModelMatrix:
     """Check one matrix, dense or sparse as `like` is."""
-    if value is None or (type(value) in {int, float} and value == 0):
+    if value is None or is_zero_number(value):
         return zeros_like(like, rows, columns)
+    _require_orientation(_shape(value), letter, rows, columns)
     return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
 
 
