@@ -139,7 +139,7 @@ def without_short_forms(
     if all([value is None for value in values]):  # noqa: C419  # a list is faster for three
         msg = f"{', '.join(letters)} are all None: a model needs at least one of them."
         raise MatrixError(msg, matrix=letters[-1])
-    shapes = [_shape(value) for value in values]
+    shapes = [shape_of(value) for value in values]
     sizes = [*(shape[0] for shape in shapes if len(shape) > 1), *(shape[0] for shape in shapes if len(shape) == 1)]
     n = size or next(iter(sizes), 1)
     return [
@@ -177,10 +177,10 @@ def _diagonal(value: object, letter: str, size: int, rows: str) -> object:
     return diagonal.reshape(-1)
 
 
-def _shape(value: object) -> tuple[int, ...]:
+def shape_of(value: Any) -> tuple[int, ...]:  # noqa: ANN401  # whatever the user gave
     """Return the shape of what may be a matrix, and that of a matrix without entries for what has none."""
     try:
-        shape = np.shape(value)  # type: ignore[arg-type]  # of whatever was given
+        shape = np.shape(value)
     except (TypeError, ValueError):
         return (0, 0)
     return shape if isinstance(shape, tuple) else (0, 0)

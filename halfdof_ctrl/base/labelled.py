@@ -68,14 +68,14 @@ def without_labels(
     MatrixError
         Labels of a kind that cannot be read: columns alone, more dimensions than two.
     """
-    matrices = dict(given)
+    numbers: dict[str, npt.NDArray[Any]] = {}
     axes: dict[str, list[Axis]] = {}
     for letter, value in given.items():
         if type(value) in UNLABELLED_TYPES or not _is_labelled(value):
             continue
-        matrices[letter] = _numbers(value, letter)
-        for number, labels in enumerate(_labels(value, letter)):
-            kind = kinds[letter][number] if np.ndim(matrices[letter]) == MATRIX_DIMENSIONS else _of_vector(kinds, letter)
+        numbers[letter] = _numbers(value, letter)
+        of_axes = kinds[letter] if numbers[letter].ndim == MATRIX_DIMENSIONS else (_of_vector(kinds[letter]),)
+        for number, (kind, labels) in enumerate(zip(of_axes, _labels(value, letter), strict=False)):
             axes.setdefault(kind, []).append(_axis(letter, number, labels))
     found = dict(names)
     for kind, together in axes.items():
@@ -87,8 +87,8 @@ def without_labels(
             if axis.labels != order and set(axis.labels) == set(order):
                 places = {label: place for place, label in enumerate(axis.labels)}
                 picked = [places[label] for label in order]
-                matrices[axis.letter] = np.take(matrices[axis.letter], picked, axis=axis.number)  # type: ignore[arg-type]
-    return matrices, found
+                numbers[axis.letter] = np.take(numbers[axis.letter], picked, axis=axis.number)
+    return {**given, **numbers}, found
 
 
 def _common_order(together: Sequence[Axis], kind: str, given: Names) -> tuple[str, ...] | None:
@@ -143,9 +143,9 @@ def _labels(value: Any, letter: str) -> list[list[object]]:  # noqa: ANN401
         raise MatrixError(msg, matrix=letter) from cause
 
 
-def _of_vector(kinds: Mapping[str, tuple[str, str]], letter: str) -> str:
+def _of_vector(kinds: tuple[str, str]) -> str:
     """Return what the entries of a vector in place of a matrix are: the rows of a column, the columns of a row."""
-    return kinds[letter][1] if kinds[letter][0] == "outputs" else kinds[letter][0]
+    return kinds[1] if kinds[0] == "outputs" else kinds[0]
 
 
 def _axis(letter: str, number: int, labels: list[object]) -> Axis:

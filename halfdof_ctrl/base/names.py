@@ -5,15 +5,16 @@ For a DOF ``y`` the package knows the force ``F_y``, the displacement, velocity 
 labels, which finite-element labels such as ``101.1`` need, so a label writes it as a colon, and a colon as ``%3A``.
 """
 
-import difflib
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
+from itertools import chain
 from typing import Literal, TypeAlias
 
 import numpy as np
 
 from halfdof_ctrl.base.errors import SignalNameError
+from halfdof_ctrl.base.near_names import nearest_names
 
 Names: TypeAlias = str | Sequence[str] | None
 
@@ -24,9 +25,9 @@ SIGNAL_WORDS = {
     "input": ("u", "the unit force on a DOF", "B"),
     "output": ("y", "a DOF's motion", "F, G, H"),
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
+MOST_LISTED = 8  #: names that a message spells out
 UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  #: categories of Unicode that a terminal or a table obeys instead of showing
 LARGEST_NUMBER = 10**18  #: node numbers of all programs are smaller
-CLOSE = 0.6  #: likeness from which a name is offered in place of an unknown one, as difflib has it
 MOST_CACHED = 1000  #: names of larger models are made anew each time, since a cache would hold on to them
 
 
@@ -111,10 +112,20 @@ def motions(dofs: tuple[str, ...]) -> dict[str, tuple[int, int]]:
     }
 
 
-def listed(names: Sequence[str], most: int = 8) -> str:
+def listed(names: Sequence[str], most: int = MOST_LISTED) -> str:
     """Join names for a message, cutting a long list short."""
     shown = ", ".join(names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def removal_of(names: Sequence[str], owner: str = "this error's `dofs`") -> str:
+    """Write the call that takes DOFs out of a model, for a message.
+
+    >>> removal_of(["1.4", "1.5"])
+    "model.without(['1.4', '1.5'])"
+    """
+    few = len(names) <= MOST_LISTED
+    return f"model.without({[str(name) for name in names]})" if few else f"model.without([...]) with {owner}"
 
 
 def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[str, ...]:
@@ -231,16 +242,24 @@ def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
     if names is None:
         return ()
     if isinstance(names, set | frozenset | Mapping | bytes) or not hasattr(names, "__iter__"):
-        kind = type(names).__name__
-        order = ", whose order changes from run to run" if isinstance(names, set | frozenset) else ""
-        msg = f"Names must be a text or a list of texts, not a {kind}{order}. Give a list, such as ['a', 'b']."
-        raise SignalNameError(msg, names=())
+        raise _no_names_error(names, what)
     try:
         found = tuple(names)
-    except TypeError as cause:  # an array without dimensions, a class
-        msg = f"Names must be a text or a list of texts, not a {type(names).__name__}. Give a list, such as ['a', 'b']."
-        raise SignalNameError(msg, names=()) from cause
+    except Exception as cause:  # an array without dimensions, a class, an object that fails
+        raise _no_names_error(names, what) from cause
     return found if all([type(name) is str for name in found]) else _as_texts(found, what)  # noqa: C419  # faster
+
+
+def _no_names_error(given: object, what: str) -> SignalNameError:
+    """Make the refusal of a single thing in place of names."""
+    number = isinstance(given, int | np.integer) and not isinstance(given, bool)
+    order = ", whose order changes from run to run" if isinstance(given, set | frozenset) else ""
+    example = f"[{given}]" if number and abs(int(given)) <= LARGEST_NUMBER else "['a', 'b']"  # type: ignore[call-overload]
+    msg = (
+        f"Names{f' of {what}' if what else ''} must be a text or a list of texts, not a {type(given).__name__}{order}. "
+        f"Give a list, such as {example}."
+    )
+    return SignalNameError(msg, names=())
 
 
 def _as_texts(names: tuple[object, ...], what: str) -> tuple[str, ...]:
@@ -337,15 +356,16 @@ def picked_places(
     places.update({name: index for index, name in enumerate(own) if name in asked})
     for name in wanted:
         if name not in places:
-            physical = force_names(dofs) if what == "input" else tuple(motions(dofs))
-            raise unknown_name_error(name, what, dict.fromkeys((*own, *physical)))
+            derivatives = range(len(DERIVATIVE_SUFFIXES))
+            physical = [force_names(dofs)] if what == "input" else [motion_names(dofs, k) for k in derivatives]
+            raise unknown_name_error(name, what, dict.fromkeys(chain(own, *physical)))
     return [places[name] for name in wanted]
 
 
 def unknown_name_error(name: str, what: str, known: Iterable[str]) -> SignalNameError:
     """Make the refusal of a name that is not in the model, with the nearest ones and the first of all."""
     names = list(known)
-    near = difflib.get_close_matches(str(name), names, n=3, cutoff=CLOSE)
+    near = nearest_names(str(name), names)
     nearest = f" Nearest: {', '.join(near)}." if near else ""
     msg = f"The model has no {what} {name!r}. Known: {listed(names, most=24)}.{nearest}"
     return SignalNameError(msg, names=(str(name),))

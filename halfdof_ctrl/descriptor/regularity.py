@@ -8,7 +8,7 @@ from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import SingularPencilError
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.sparse_factors import PIVOTINGS
 from halfdof_ctrl.base.threads import limited_threads
@@ -44,8 +44,8 @@ def require_regular_sparse(model: SecondOrderModel) -> None:
     msg = (
         f"The pencil is singular: det P(s) vanishes at every s (smallest singular value {ratio:.1e} of the largest "
         f"after scaling). DOFs {listed(dofs)} can move together in any way without a force: a node without spring, "
-        "damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant or give "
-        "it a stiffness."
+        "damper or mass, a constraint that stands twice, or two identical equations. Remove what is redundant, give "
+        f"what is loose a stiffness, or take it out: {removal_of(dofs)}."
     )
     raise SingularPencilError(msg, dofs=dofs)
 

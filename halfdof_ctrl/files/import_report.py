@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import EPS
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.files.definiteness import Inertia, inertia
 from halfdof_ctrl.files.formats.digits import digits_in_words
 from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
@@ -122,7 +122,8 @@ class ImportReport:
         if self.empty:
             found.append(
                 f"{len(self.empty)} DOFs have no entry in any matrix ({listed(self.empty)}): they move without a "
-                "force, and the model has no state space. Remove them."
+                "force, and the model has no state space. Take them out: "
+                f"{removal_of(self.empty, owner='the names in `empty` of hd.inspect_files')}."
             )
         return tuple(found)
 

@@ -66,7 +66,7 @@ class DescriptorSystem(SecondOrderModel):
 
 
 def dss(
-    A: MatrixLike,
+    A: MatrixLike | None,
     B: MatrixLike,
     C: MatrixLike,
     D: MatrixLike | None,

@@ -1,10 +1,9 @@
 """The door: `mechss` checks matrices and names once and returns a `SecondOrderModel`."""
 
 from collections.abc import Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import (
     MATRIX_DIMENSIONS,
@@ -13,6 +12,7 @@ from halfdof_ctrl.base.arrays import (
     checked_matrix,
     checked_square_matrices,
     is_zero_number,
+    shape_of,
 )
 from halfdof_ctrl.base.doors import require_text
 from halfdof_ctrl.base.errors import MatrixError
@@ -90,7 +90,8 @@ def mechss(
     Dv, Da : (p, m) array_like, optional
         Direct terms of the first and second derivative of the inputs.
     dofs, inputs, outputs : str or sequence of str, optional
-        Names; whole numbers in a list, such as those of nodes, are read as text. By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
+        Names; whole numbers in a list, such as those of nodes, are read as text.
+        By default the DOFs are ``q0, q1, ...``, a unit force on a DOF is ``F_<dof>``, a DOF's
         motion ``<dof>``, ``<dof>_dot`` or ``<dof>_ddot``, and any other signal ``u[0]``, ``y[0]``, ...
     name : str, optional
         Name of the model.
@@ -169,8 +170,8 @@ def _signals(given: Sequence[MatrixLike | None], axis: int, default: int) -> int
     """Count the inputs (axis 1) or outputs (axis 0) by the first matrix that is given."""
     for value in given:
         if value is not None:
-            shape = _shape(value)
-            return shape[axis] if len(shape) == MATRIX_DIMENSIONS else 1
+            shape = shape_of(value)
+            return shape[axis] or 1 if len(shape) == MATRIX_DIMENSIONS else 1
     return default
 
 
@@ -189,20 +190,11 @@ def _require_orientation(found: tuple[int, ...], letter: str, rows: int, columns
         raise MatrixError(msg, matrix=letter)
 
 
-def _shape(value: MatrixLike) -> tuple[int, ...]:
-    """Return the shape of a matrix; that of what is none is left to the check of the matrix itself."""
-    try:
-        shape = np.shape(cast("npt.ArrayLike", value))
-    except (TypeError, ValueError):
-        return ()
-    return shape if isinstance(shape, tuple) else ()
-
-
 def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: ModelMatrix) -> ModelMatrix:
     """Check one matrix, dense or sparse as `like` is."""
     if value is None or is_zero_number(value):
         return zeros_like(like, rows, columns)
-    _require_orientation(_shape(value), letter, rows, columns)
+    _require_orientation(shape_of(value), letter, rows, columns)
     return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
 
 

@@ -31,6 +31,7 @@ from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer, sq
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 from halfdof_ctrl.model.quadratics import Quadratics
+from halfdof_ctrl.model.removal import kept_without, picked
 
 LETTERS = ("M", "C", "K", "B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
 
@@ -196,6 +197,52 @@ class SecondOrderModel:
             prescribed=(*self.prescribed, *new.names),
         )
         return model.select(new.inputs, new.outputs)
+
+    def without(self, dofs: Names) -> "SecondOrderModel":
+        """Return the model without some DOFs: without their rows, columns and signals.
+
+        Parameters
+        ----------
+        dofs : str or sequence of str
+            Those to be taken out. What is tied to them sees them held at rest, as if their displacements were zero. A
+            DOF to which nothing is attached, such as a rotation of a solid element, leaves no trace.
+
+        Returns
+        -------
+        SecondOrderModel
+            Inputs that act, and outputs that show, nothing but these DOFs are left out too; the others stay, less the
+            part that these DOFs had in them. The remaining DOFs are inertial, half or static by what the remaining
+            matrices say.
+
+        Raises
+        ------
+        SignalNameError
+            A DOF that is unknown, named twice or prescribed; no DOF, no input or no output left.
+
+        Examples
+        --------
+        A mass on a spring of 8 N/m, and a DOF to which nothing is attached:
+
+        >>> model = mechss([2, 0], None, [[8, 0], [0, 0]], dofs=["mass", "rotation"])
+        >>> model.without("rotation")
+        SecondOrderModel: 1 DOFs: 1 inertial, 0 half, 0 static; 2 states
+          dofs:    mass
+          inputs:  F_mass
+          outputs: mass
+        """
+        dof, m, p = kept_without(self, dofs, self.quadratics)
+        axes = {"B": (dof, m), "F": (p, dof), "G": (p, dof), "H": (p, dof), "D": (p, m)}
+        matrices: dict[str, Any] = {
+            letter: picked(matrix, *axes.get(letter[0], (dof, dof)))
+            for letter, matrix in zip(LETTERS, self._matrices(), strict=True)
+        }
+        return replace(
+            self,
+            **matrices,
+            dofs=tuple([self.dofs[place] for place in dof]),
+            inputs=tuple([self.inputs[place] for place in m]),
+            outputs=tuple([self.outputs[place] for place in p]),
+        )
 
     def as_descriptor(self) -> DescriptorForm:
         """Give the model as a descriptor system ``E x' = A x + B u``, ``y = C x + D u`` of first order.

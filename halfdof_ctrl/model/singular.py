@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import EPS, DenseMatrix, powers_of_two
 from halfdof_ctrl.base.errors import SingularPencilError
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import listed, removal_of
 
 Kind: TypeAlias = Literal["unattached", "unused", "floating", "redundant", "free", "empty", "identical", "dependent"]
 CAUSE_WORDS: dict[Kind, str] = {
@@ -34,8 +34,8 @@ CAUSE_WORDS: dict[Kind, str] = {
     "dependent": "the equations of {names} are dependent, so that one follows from the others",
 }
 REMEDIES: dict[Kind, str] = {
-    "unattached": "Attach a spring, a damper or a mass to what is loose, or remove it.",
-    "unused": "Attach a spring, a damper or a mass to what is loose, or remove it.",
+    "unattached": "Attach a spring, a damper or a mass to what is loose, or take it out: {removal}.",
+    "unused": "Attach a spring, a damper or a mass to what is loose, or take it out: {removal}.",
     "floating": "Tie what floats to the ground, or give it its mass.",
     "redundant": "Remove one of the redundant constraints.",
     "free": "Put the equation that is missing in place of one that follows from others.",
@@ -192,14 +192,16 @@ def singular_pencil_error(
     >>> print(error)  # doctest: +NORMALIZE_WHITESPACE
     The pencil is singular: det P(s) vanishes at every s (its rank is 1 of 2). DOF b can move in any way without a
     force, and the equation of b says nothing: nothing is attached to b, no spring, no damper and no mass. Attach a
-    spring, a damper or a mass to what is loose, or remove it.
+    spring, a damper or a mass to what is loose, or take it out: model.without(['b']).
     """
     moving = f"DOFs {listed(dofs)} can move together" if len(dofs) > 1 else f"DOF {listed(dofs)} can move"
     saying = "equations of {} depend on each other" if len(equations) > 1 else "equation of {} says nothing"
     reasons = [str(cause) for cause in causes[:MOST_CAUSES]]
     if len(causes) > MOST_CAUSES:
         reasons.append(f"and {len(causes) - MOST_CAUSES} more such causes")
-    remedies = dict.fromkeys(REMEDIES[cause.kind] for cause in causes) or {"Remove what is redundant or loose.": None}
+    outside = [name for cause in causes if "removal" in REMEDIES[cause.kind] for name in cause.names]
+    remedies = list(dict.fromkeys(REMEDIES[cause.kind].format(removal=removal_of(outside)) for cause in causes))
+    remedies = remedies or [f"Remove what is redundant, or take out what is loose: {removal_of(dofs)}."]
     msg = (
         f"The pencil is singular: det P(s) vanishes at every s ({fact}). {moving} in any way without a force, and the "
         f"{saying.format(listed(equations))}{': ' if reasons else ''}{'; '.join(reasons)}. {' '.join(remedies)}"

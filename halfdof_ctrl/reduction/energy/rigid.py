@@ -22,6 +22,7 @@ from scipy.linalg.lapack import dpotrf, dpstrf
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, powers_of_two
 from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
+from halfdof_ctrl.base.names import removal_of
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
 SMALL_PIVOT = 128.0  #: times n eps of the diagonal: a smaller pivot may stand for a motion that is free, or nearly
@@ -169,7 +170,8 @@ def _pivots(K: FloatArray, first: int, names: tuple[str, ...]) -> tuple[IndexArr
 def _floating_error(dof: str) -> EnergyFormError:
     msg = (
         f"There are no energy coordinates: static DOF {dof} (no mass, no damping) moves without any force, alone or "
-        "together with others of its kind, or the stiffness is negative there. Tie it with a spring or remove it."
+        "together with others of its kind, or the stiffness is negative there. Tie it with a spring, or take it out: "
+        f"{removal_of([dof])}."
     )
     return EnergyFormError(msg, reason="floating", dofs=(dof,))
 

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array, hstack
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ModelSizeError, SingularPencilError
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
@@ -101,7 +101,7 @@ def _inner_stiffness(parts: Parts, inner: IndexArray, dofs: tuple[str, ...]) -> 
         loose = tuple([dofs[place] for place in inner[null > DEPENDENT_CORRECTIONS * null.max()].tolist()])
         msg = (
             f"With the kept DOFs held, DOFs {listed(loose)} still move without a force and without mass: nodes without "
-            "springs, or a part that nothing holds. Remove them or give them a stiffness."
+            f"springs, or a part that nothing holds. Give them a stiffness, or take them out: {removal_of(loose)}."
         )
         raise SingularPencilError(msg, dofs=loose)
     return stiffness

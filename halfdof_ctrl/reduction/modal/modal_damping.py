@@ -16,7 +16,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.doors import is_real_number
 from halfdof_ctrl.base.errors import ComplexModelError, MatrixError, ModelSizeError, ParameterError, SingularPencilError
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -118,7 +118,10 @@ def _modes(M: FloatArray, K: FloatArray, dofs: tuple[str, ...]) -> tuple[FloatAr
     if values[0] <= MASSLESS_MOTION * values[-1]:
         part = np.abs(vectors[:, 0])
         loose = tuple([dofs[i] for i in np.flatnonzero(part > NULL_VECTOR_SHARE * part.max()).tolist()])
-        msg = f"DOFs {listed(loose)} move together without mass and without stiffness. Give them one or remove them."
+        msg = (
+            f"DOFs {listed(loose)} move together without mass and without stiffness. Give them one, or take them out: "
+            f"{removal_of(loose)}."
+        )
         raise SingularPencilError(msg, dofs=loose)
     scaled, both = M * scale * scale[:, None], shifted * scale * scale[:, None]
     slowness, turned = scipy.linalg.eigh((scaled + scaled.T) / 2.0, (both + both.T) / 2.0)
