@@ -25,6 +25,8 @@ LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense fo
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
+SMALLEST_SIZE = 1e-75  #: of the largest entry of a column, so that products of four have no underflow
+LARGEST_SIZE = 1e75  #: of an entry, so that products of four do not overflow
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -100,8 +102,38 @@ def checked_square_matrices(values: Sequence[object], letters: str, rows: str = 
         checked.append(None if value is None else checked_matrix(full_square(value), letter, size))
         if size is None and checked[-1] is not None:
             size = (checked[-1].shape[0], checked[-1].shape[1])
+        if checked[-1] is not None:
+            require_range(letter, np.abs(checked[-1]).max(axis=0))
     size = size or (1, 1)  # nothing but the number 0
     return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
+
+
+def require_range(letter: str, largest: FloatArray, line: str = "column") -> None:
+    """Refuse numbers of which products overflow or vanish, such as subnormal ones.
+
+    Parameters
+    ----------
+    letter : str
+        Of the matrix.
+    largest : (k,) ndarray
+        Size of the largest entry of each column, or row. Entries that are small beside it do no harm.
+    line : str
+        What it is of.
+
+    Raises
+    ------
+    MatrixError
+        One is above 1e75, or below 1e-75 but not zero.
+    """
+    wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))
+    if wrong.size:
+        place = int(wrong[0])
+        msg = (
+            f"The largest entry of {line} {place} of {letter} is {largest[place]:.1e} in size, and products of such "
+            f"numbers {'overflow' if largest[place] > 1.0 else 'vanish'}: sizes from {SMALLEST_SIZE:.0e} to "
+            f"{LARGEST_SIZE:.0e} can be computed with. Choose other units, or write what is nothing as 0."
+        )
+        raise MatrixError(msg, matrix=letter)
 
 
 def without_short_forms(
@@ -181,7 +213,7 @@ def shape_of(value: Any) -> tuple[int, ...]:  # noqa: ANN401  # whatever the use
     """Return the shape of what may be a matrix, and that of a matrix without entries for what has none."""
     try:
         shape = np.shape(value)
-    except (TypeError, ValueError):
+    except Exception:  # noqa: BLE001  # the object is the user's; that it is no matrix is told by `checked_matrix`
         return (0, 0)
     return shape if isinstance(shape, tuple) else (0, 0)
 
@@ -231,7 +263,7 @@ def _numbers(value: object, letter: str) -> DenseMatrix:
             return array.astype(np.float64)
         if array.dtype.kind == "c":
             return array.astype(np.complex128) if array.imag.any() else array.real.astype(np.float64)
-    except (TypeError, ValueError, OverflowError) as cause:
+    except Exception as cause:
         msg = f"{letter} is not a matrix of numbers: {cause}."
         raise MatrixError(msg, matrix=letter) from cause
     msg = f"{letter} holds entries of type {array.dtype} where numbers are needed. Convert them first."
@@ -246,7 +278,8 @@ def _stacked(values: Sequence[object]) -> list[DenseMatrix] | None:
         return None
     if stack.dtype != REAL or stack.ndim != 1 + MATRIX_DIMENSIONS or stack.shape[1] != stack.shape[2] or not stack.size:
         return None
-    if not np.logical_and.reduce(np.isfinite(stack), axis=None):
+    size = np.abs(stack)  # whose comparisons with NaN are false
+    if not np.logical_and.reduce((size <= LARGEST_SIZE) & (size >= SMALLEST_SIZE) | (size == 0.0), axis=None):
         return None
     stack.setflags(write=False)
     return list(stack)

@@ -153,6 +153,13 @@ def require_path(value: object, taker: str) -> None:
     """
     if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
         raise wrong_object(taker, "the path of a file, a text or pathlib.Path", value, parameter="path")
+    try:
+        sound = b"\0" not in os.fsencode(value)
+    except UnicodeEncodeError:
+        sound = False
+    if not sound:
+        msg = f"{taker} is {shown(value)}, which holds characters that no file system takes. Take others."
+        raise ParameterError(msg, parameter="path", value=value)
 
 
 def answer_of(function: Callable[..., Any], *arguments: object, parameter: str, meaning: str) -> Any:  # noqa: ANN401
@@ -192,7 +199,7 @@ def items_of(value: Iterable[Item], taker: str, wanted: str, *, parameter: str) 
     """
     try:
         return list(value)
-    except (TypeError, OSError) as cause:  # python-control's systems raise the latter
+    except Exception as cause:
         raise wrong_object(taker, wanted, value, parameter=parameter) from cause
 
 
@@ -215,7 +222,7 @@ def real_numbers(value: Any, parameter: str, meaning: str) -> FloatArray:  # noq
     try:
         given = np.asarray(value)
         numbers = given.astype(float) if given.dtype.kind in "biufO" else None
-    except (TypeError, ValueError, OverflowError) as cause:
+    except Exception as cause:
         msg = f"{parameter} must be {meaning}, not {shown(value)}: {cause}."
         raise ParameterError(msg, parameter=parameter, value=value) from cause
     if numbers is None or (given.dtype == object and any(isinstance(entry, str | bytes) for entry in given.flat)):

@@ -114,9 +114,12 @@ def _common_order(together: Sequence[Axis], kind: str, given: Names) -> tuple[st
 
 
 def _is_labelled(value: object) -> bool:
-    if isinstance(value, type) or not (hasattr(value, "to_numpy") or hasattr(value, "values")):
+    try:
+        if isinstance(value, type) or not (hasattr(value, "to_numpy") or hasattr(value, "values")):
+            return False
+        index = getattr(value, "index", None)
+    except Exception:  # noqa: BLE001  # the object is the user's; that it is no matrix is told later
         return False
-    index = getattr(value, "index", None)
     return hasattr(value, "columns") or hasattr(value, "coords") or (index is not None and not callable(index))
 
 

@@ -8,15 +8,17 @@ labels, which finite-element labels such as ``101.1`` need, so a label writes it
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
-from itertools import chain
-from typing import Literal, TypeAlias
+from itertools import chain, islice
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
+from halfdof_ctrl.base.doors import shown, wrong_object
 from halfdof_ctrl.base.errors import SignalNameError
 from halfdof_ctrl.base.near_names import nearest_names
 
 Names: TypeAlias = str | Sequence[str] | None
+Value = TypeVar("Value")
 
 DERIVATIVE_SUFFIXES = ("", "_dot", "_ddot")
 FORCE_PREFIX = "F_"
@@ -25,6 +27,7 @@ SIGNAL_WORDS = {
     "input": ("u", "the unit force on a DOF", "B"),
     "output": ("y", "a DOF's motion", "F, G, H"),
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
+MOST_NAMES = 10**8  #: more than memory holds: an iterator without an end is stopped there
 MOST_LISTED = 8  #: names that a message spells out
 UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  #: categories of Unicode that a terminal or a table obeys instead of showing
 LARGEST_NUMBER = 10**18  #: node numbers of all programs are smaller
@@ -114,8 +117,8 @@ def motions(dofs: tuple[str, ...]) -> dict[str, tuple[int, int]]:
 
 def listed(names: Sequence[str], most: int = MOST_LISTED) -> str:
     """Join names for a message, cutting a long list short."""
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+    text = ", ".join(names[:most])
+    return text if len(names) <= most else f"{text} and {len(names) - most} more"
 
 
 def removal_of(names: Sequence[str], owner: str = "this error's `dofs`") -> str:
@@ -241,13 +244,43 @@ def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
         return (str(names),)
     if names is None:
         return ()
-    if isinstance(names, set | frozenset | Mapping | bytes) or not hasattr(names, "__iter__"):
+    if isinstance(names, set | frozenset | Mapping | bytes):
         raise _no_names_error(names, what)
     try:
-        found = tuple(names)
+        found = tuple(islice(names, MOST_NAMES))
     except Exception as cause:  # an array without dimensions, a class, an object that fails
         raise _no_names_error(names, what) from cause
     return found if all([type(name) is str for name in found]) else _as_texts(found, what)  # noqa: C419  # faster
+
+
+def by_name(given: Mapping[Any, Value], known: Sequence[str], what: str) -> dict[str, Value]:
+    """Read a mapping from names of a model; whole numbers are read as text.
+
+    Raises
+    ------
+    SignalNameError
+        A name that is not known.
+    WrongObjectError
+        A mapping that does not give what it holds.
+
+    Examples
+    --------
+    >>> by_name({101: 2.0}, ("100", "101"), "DOF")
+    {'101': 2.0}
+    """
+    try:
+        items = list(given.items())
+    except Exception as cause:
+        raise wrong_object("This argument", f"a mapping from {what} to numbers", given, parameter=what) from cause
+    among = known if len(items) <= MOST_LISTED else set(known)
+    found: dict[str, Value] = {}
+    for key, value in items:
+        number = isinstance(key, int | np.integer) and not isinstance(key, bool)
+        name = str(key) if isinstance(key, str) or (number and abs(key) <= LARGEST_NUMBER) else None
+        if name is None or name not in among:
+            raise unknown_name_error(key if name is None else name, what, known)
+        found[name] = value
+    return found
 
 
 def _no_names_error(given: object, what: str) -> SignalNameError:
@@ -362,13 +395,13 @@ def picked_places(
     return [places[name] for name in wanted]
 
 
-def unknown_name_error(name: str, what: str, known: Iterable[str]) -> SignalNameError:
+def unknown_name_error(name: object, what: str, known: Iterable[str]) -> SignalNameError:
     """Make the refusal of a name that is not in the model, with the nearest ones and the first of all."""
     names = list(known)
-    near = nearest_names(str(name), names)
+    near = nearest_names(name, names) if isinstance(name, str) else []
     nearest = f" Nearest: {', '.join(near)}." if near else ""
-    msg = f"The model has no {what} {name!r}. Known: {listed(names, most=24)}.{nearest}"
-    return SignalNameError(msg, names=(str(name),))
+    msg = f"The model has no {what} {shown(name)}. Known: {listed(names, most=24)}.{nearest}"
+    return SignalNameError(msg, names=(name if isinstance(name, str) else shown(name),))
 
 
 def _duplicates(names: Iterable[str]) -> tuple[str, ...]:

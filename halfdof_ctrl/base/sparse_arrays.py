@@ -19,6 +19,7 @@ from halfdof_ctrl.base.arrays import (
     ModelMatrix,
     checked_matrix,
     read_only,
+    require_range,
     require_shape,
     unit_matrix,
     without_short_forms,
@@ -116,10 +117,13 @@ def checked_sparse_squares(values: Sequence[object], letters: str, rows: str = "
     """
     shape = next(np.shape(cast("Any", value)) for value in values if issparse(value))
     require_shape(shape, next(letter for letter, value in zip(letters, values, strict=True) if issparse(value)), None)
-    return [
+    matrices = [
         sparse_zeros(*shape) if value is None else checked_sparse_matrix(_square(value), letter, (shape[0], shape[1]))
         for letter, value in zip(letters, without_short_forms(values, letters, rows=rows), strict=True)
     ]
+    for letter, matrix in zip(letters, matrices, strict=True):
+        require_range(letter, largest_by_row_and_column(matrix)[1])
+    return matrices
 
 
 def _square(value: object) -> object:

@@ -8,11 +8,20 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray, checked_matrix, full_square, is_zero_number, without_short_forms
+from halfdof_ctrl.base.arrays import (
+    LARGEST_SIZE,
+    SMALLEST_SIZE,
+    FloatArray,
+    checked_matrix,
+    full_square,
+    is_zero_number,
+    require_range,
+    without_short_forms,
+)
 from halfdof_ctrl.base.doors import is_real_number, shown, wrong_object
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.labelled import has_labels, without_labels
-from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
+from halfdof_ctrl.base.names import by_name, listed, motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import mech2ss
@@ -74,7 +83,9 @@ def _square(value: object, letter: str, size: int, rows: str) -> FloatArray:
     if is_real_number(value):
         value = np.full(size, value)
     full = full_square(without_short_forms((value,), (letter,), size, rows)[0])
-    return checked_matrix(np.zeros((size, size)) if full is None else full, letter, (size, size))
+    matrix = checked_matrix(np.zeros((size, size)) if full is None else full, letter, (size, size))
+    require_range(letter, np.abs(matrix).max(axis=0))
+    return matrix
 
 
 def checked_weights(model: SecondOrderModel, motions: list[Weights], energy: float | None) -> PhysicalWeights:
@@ -157,17 +168,18 @@ def _checked_weights(weights: object, known: tuple[str, ...], what: str) -> Iter
     if not isinstance(weights, Mapping):
         example = f"such as {{{known[0]!r}: 1.0}}"
         raise wrong_object("A weight", f"a mapping from {what} to a number, {example}", weights, parameter="weights")
-    for name, value in weights.items():
-        if name not in known:
-            raise unknown_name_error(name, what, known)
+    for name, value in by_name(weights, known, what).items():
         yield name, _checked_weight(name, value)
 
 
 def _checked_weight(name: str, value: object) -> float:
     """Read one weight: a finite number that is not negative."""
     number = float(value) if is_real_number(value) else math.nan  # type: ignore[arg-type]
-    if not math.isfinite(number) or number < 0.0:
-        msg = f"The weight of {name} is {shown(value)}, but it must be a finite number that is not negative."
+    if not math.isfinite(number) or number < 0.0 or number > LARGEST_SIZE or 0.0 < number < SMALLEST_SIZE:
+        msg = (
+            f"The weight of {name} is {shown(value)}, but it must be a finite number that is not negative: 0, or from "
+            f"{SMALLEST_SIZE:.0e} to {LARGEST_SIZE:.0e}."
+        )
         raise WeightError(msg, names=(name,))
     return number
 

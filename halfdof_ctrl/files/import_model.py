@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.doors import is_choice, require_path, shown
 from halfdof_ctrl.base.errors import (
     FileFormatError,
     ImportedModelWarning,
@@ -80,20 +81,24 @@ def _checked(
     matrices: object,
 ) -> list[Path] | dict[str, Path]:
     """Return paths, and refuse options that are none."""
-    if triangle is not None and triangle not in TRIANGLES:
-        msg = f"triangle={triangle!r}, but it is 'lower', 'upper' or None: what files store of a symmetric matrix."
+    if triangle is not None and not is_choice(triangle, TRIANGLES):
+        msg = f"triangle={shown(triangle)}, but it is 'lower', 'upper' or None: what files store of a symmetric matrix."
         raise ParameterError(msg, parameter="triangle", value=triangle)
     if not isinstance(remove_fixed, bool):
-        msg = f"remove_fixed={remove_fixed!r}, but it is True or False."
+        msg = f"remove_fixed={shown(remove_fixed)}, but it is True or False."
         raise ParameterError(msg, parameter="remove_fixed", value=remove_fixed)
     sound = matrices is None or (
         isinstance(matrices, Mapping)
         and all(isinstance(key, str) and (name is None or isinstance(name, str)) for key, name in matrices.items())
     )
     if not sound:
-        msg = f"matrices={matrices!r}, but it is a mapping from letters to names in files, as {{'K': 'kaa', 'C': 'D'}}."
+        msg = (
+            f"matrices={shown(matrices)}, but it is a mapping from letters to names in files, as {{'K': 'kaa', 'C': "
+            "'D'}."
+        )
         raise ParameterError(msg, parameter="matrices", value=matrices)
     if isinstance(path, str | os.PathLike):
+        require_path(path, "The path")
         return [Path(path)]
     paths = path.values() if isinstance(path, Mapping) else path if isinstance(path, Sequence) else None
     if paths is None or not all(isinstance(one, str | os.PathLike) for one in paths):
@@ -105,6 +110,8 @@ def _checked(
     if not path:
         msg = "No file is given. Give at least the stiffness."
         raise FileFormatError(msg, path="")
+    for one in paths:
+        require_path(one, "A path")
     return {letter: Path(one) for letter, one in path.items()} if isinstance(path, Mapping) else [*map(Path, path)]
 
 

@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, is_zero
+from halfdof_ctrl.base.doors import is_real_number, shown
+from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.files.containers import PathLike
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
@@ -167,4 +169,7 @@ def inspect_files(
     ...     inspect_files(f"{folder}/mount.npz").matrices[0].rank
     'positive semidefinite, rank 1'
     """
+    if not is_real_number(largest) or largest < 0:
+        msg = f"largest = {shown(largest)}, but it must be a number of DOFs, 0 or more."
+        raise ParameterError(msg, parameter="largest", value=largest)
     return import_report(path, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest)

@@ -161,7 +161,7 @@ class Force:
     ) -> None:
         for what, part in (("function", function), ("jacobian", jacobian)):
             if not callable(part) and (part is not None or what == "function"):
-                msg = f"The {what} of a Force must be callable with (q, v, t), not {part!r}."
+                msg = f"The {what} of a Force must be callable with (q, v, t), not {shown(part)}."
                 raise ParameterError(msg, parameter=what, value=part)
         q, v = (checked_names(as_tuple(names), len(as_tuple(names)), "DOFs") for names in (displacements, velocities))
         acted = tuple(dict.fromkeys((*q, *v))) if on is None else checked_names(as_tuple(on), len(as_tuple(on)), "DOFs")
@@ -193,8 +193,12 @@ def ends_in_words(a: str, b: str | None) -> str:
 def _check_ends(kind: str, a: object, b: object) -> None:
     for end in (a, b):
         if not (isinstance(end, str) and end) and not (end is None and end is b):
-            msg = f"The ends of a {kind} are DOFs by name, the second may be None for the ground; {end!r} is neither."
-            raise SignalNameError(msg, names=(repr(end),))
+            number = f" Write it as text, {str(end)!r}." if type(end) is int and is_real_number(end) else ""
+            msg = (
+                f"The ends of a {kind} are DOFs by name, the second may be None for the ground; {shown(end)} is "
+                f"neither.{number}"
+            )
+            raise SignalNameError(msg, names=(shown(end),))
     if a == b:
         msg = f"A {kind} from {a} to itself never stretches and pulls at nothing. Name the DOF at its other end."
         raise SignalNameError(msg, names=(str(a),))

@@ -174,7 +174,7 @@ def checked_points(s: npt.ArrayLike) -> ComplexArray:
     try:
         given = np.asarray(s)
         points = given.astype(np.complex128) if given.dtype.kind in "biufcO" else None
-    except (TypeError, ValueError, OverflowError) as cause:
+    except Exception as cause:
         msg = f"s must be numbers [rad/s], not {shown(s)}: {cause}."
         raise ParameterError(msg, parameter="s", value=s) from cause
     if points is None:

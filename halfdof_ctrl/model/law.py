@@ -13,6 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from halfdof_ctrl.base.doors import shown
 from halfdof_ctrl.base.errors import ParameterError
 
 Function: TypeAlias = Callable[[Any], Any]
@@ -74,11 +75,11 @@ class Law:
         """Check the parts, and difference a slope that is missing."""
         for what, part in (("force", self.force), ("slope", self.slope), ("inverse", self.inverse)):
             if not callable(part) and (part is not None or what == "force"):
-                msg = f"The {what} of a law must be a function of one variable, not {part!r}. Give a callable."
+                msg = f"The {what} of a law must be a function of one variable, not {shown(part)}. Give a callable."
                 raise ParameterError(msg, parameter=what, value=part)
         for what, pair in (("bounds", self.bounds), ("domain", self.domain)):
             if pair is not None and not _is_rising_pair(pair):
-                msg = f"The {what} of a law must be two numbers of which the second is larger, not {pair!r}."
+                msg = f"The {what} of a law must be two numbers of which the second is larger, not {shown(pair)}."
                 raise ParameterError(msg, parameter=what, value=pair)
         given: object = self.slope
         if given is None:
@@ -159,6 +160,6 @@ def _limit(quotients: np.ndarray) -> float:
 def _is_rising_pair(pair: object) -> bool:
     try:
         low, high = (float(value) for value in pair)  # type: ignore[attr-defined]
-    except (TypeError, ValueError, OverflowError, OSError):
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
         return False
     return low < high

@@ -20,6 +20,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.law import EVERYWHERE, Law
 from halfdof_ctrl.model.law_functions import (
@@ -210,13 +211,14 @@ def gap(k: float, upper: float, lower: float | None = None) -> Law:
     [-50.0, 0.0, 50.0]
     """
     (a,) = _numbers(gap, k=k)
-    above, below = float(upper), float(upper if lower is None else lower)
+    ways = (upper, upper if lower is None else lower)
+    above, below = (float(way) if is_real_number(way) else math.nan for way in ways)
     overlap = not above + below >= 0.0  # NaN too
     if a < 0.0 or overlap or math.isinf(above):
         msg = (
-            f"gap: k = {k}, upper = {upper}, lower = {lower}, but a stop needs a stiffness that is not negative, a "
-            "finite way to it, and one to the other stop that does not overlap. For a stop on the negative side alone, "
-            "turn the element round."
+            f"gap: k = {k}, upper = {shown(upper)}, lower = {shown(lower)}, but a stop needs a stiffness that is not "
+            "negative, a finite way to it, and one to the other stop that does not overlap. For a stop on the negative "
+            "side alone, turn the element round."
         )
         raise ParameterError(msg, parameter="gap", value=(k, upper, lower))
     left, right = (0.0 if math.isinf(below) or not a else -math.inf), (math.inf if a else 0.0)
@@ -350,12 +352,9 @@ def _written(law: Callable[..., Law], *given: float | None) -> str:
 def _numbers(law: Callable[..., Law], **given: Any) -> tuple[float, ...]:  # noqa: ANN401  # whatever the user gave
     numbers: list[float] = []
     for name, value in given.items():
-        try:
-            number = float(value)
-        except (TypeError, ValueError):
-            number = math.nan
+        number = float(value) if is_real_number(value) else math.nan
         if not math.isfinite(number):
-            msg = f"{law.__name__}: {name} = {value!r}, but it must be a finite real number."
+            msg = f"{law.__name__}: {name} = {shown(value)}, but it must be a finite real number."
             raise ParameterError(msg, parameter=name, value=value)
         numbers.append(number)
     return tuple(numbers)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
+from halfdof_ctrl.base.doors import is_choice, real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 
 FEWEST = 2  #: points that make a curve
@@ -72,14 +73,11 @@ class MeasuredCurve:
 
 
 def _checked(x: npt.ArrayLike, f: npt.ArrayLike, extend: object) -> tuple[FloatArray, FloatArray]:
-    if extend not in (None, "linear"):
-        msg = f'table: extend must be "linear" or left out, not {extend!r}.'
+    if extend is not None and not is_choice(extend, ("linear",)):
+        msg = f'table: extend must be "linear" or left out, not {shown(extend)}.'
         raise ParameterError(msg, parameter="extend", value=extend)
-    try:
-        points, values = (np.array(given, dtype=float) for given in (x, f))
-    except (TypeError, ValueError) as cause:
-        msg = f"table: x and f must be real numbers ({cause})."
-        raise ParameterError(msg, parameter="table", value=None) from cause
+    points = np.array(real_numbers(x, "table: x", "real numbers"))
+    values = np.array(real_numbers(f, "table: f", "real numbers"))
     if points.ndim != 1 or points.shape != values.shape or points.size < FEWEST:
         shapes = f"{points.shape} and {values.shape}"
         msg = f"table: x and f must be two rows of the same {FEWEST} or more numbers, not of shapes {shapes}."

@@ -12,6 +12,7 @@ from halfdof_ctrl.base.arrays import (
     checked_matrix,
     checked_square_matrices,
     is_zero_number,
+    require_range,
     shape_of,
 )
 from halfdof_ctrl.base.doors import require_text
@@ -32,6 +33,7 @@ from halfdof_ctrl.base.sparse_arrays import (
     filled_rows,
     has_sparse,
     is_sparse,
+    largest_by_row_and_column,
     transposed,
     unit_columns,
     unit_like,
@@ -195,7 +197,18 @@ def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: 
     if value is None or is_zero_number(value):
         return zeros_like(like, rows, columns)
     _require_orientation(shape_of(value), letter, rows, columns)
-    return (checked_sparse_matrix if is_sparse(like) else checked_matrix)(value, letter, (rows, columns))
+    matrix: ModelMatrix
+    if is_sparse(like):
+        matrix = sparse = checked_sparse_matrix(value, letter, (rows, columns))
+        by_row, by_column = largest_by_row_and_column(sparse)
+    else:
+        matrix = dense = checked_matrix(value, letter, (rows, columns))
+        by_row, by_column = (np.abs(dense).max(axis=axis) for axis in (1, 0))
+    if letter[0] == "B":
+        require_range(letter, by_column)
+    else:
+        require_range(letter, by_row, "row")
+    return matrix
 
 
 def _input_names(given: Names, columns: Sequence[ModelMatrix], dofs: tuple[str, ...]) -> tuple[str, ...]:

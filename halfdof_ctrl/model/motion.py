@@ -23,7 +23,7 @@ from typing import Literal, Protocol, TypeAlias, get_args
 import numpy as np
 
 from halfdof_ctrl.base.arrays import DenseMatrix, ModelMatrix
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import (
     Names,
@@ -98,7 +98,7 @@ def prescribed_signals(model: Named, dof: Names, kind: MotionKind, inputs: Names
         A DOF that is unknown, named twice or prescribed already; no DOF left; a name that is taken.
     """
     if not is_choice(kind, KINDS):
-        msg = f"kind must be one of {listed(KINDS)}, not {kind!r}."
+        msg = f"kind must be one of {listed(KINDS)}, not {shown(kind)}."
         raise ParameterError(msg, parameter="kind", value=kind)
     derivative = KINDS.index(kind)
     driven = places_of_dofs(model, dof)

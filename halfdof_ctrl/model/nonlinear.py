@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.base.doors import items_of
+from halfdof_ctrl.base.doors import items_of, shown
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, listed, reaction_names, unknown_name_error
 from halfdof_ctrl.model.checked_laws import check_force, check_law
@@ -359,7 +359,7 @@ def _law_name(element: Element) -> str:
 
 def _require_element(element: object) -> None:
     if not isinstance(element, Spring | Damper | Force):
-        msg = f"Elements are Spring, Damper and Force; {element!r} is a {type(element).__name__}."
+        msg = f"Elements are Spring, Damper and Force; {shown(element)} is a {type(element).__name__}."
         raise ParameterError(msg, parameter="elements", value=element)
 
 

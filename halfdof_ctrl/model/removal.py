@@ -66,14 +66,18 @@ def kept_without(model: Named, dofs: Names, quadratics: Quadratics) -> Kept:
     _, B, F, D = quadratics
     inputs = _still_used(B, D, out)
     outputs = _still_used([matrix.T for matrix in F], [matrix.T for matrix in D], out)
-    for kept, what, every in ((inputs, "input", model.inputs), (outputs, "output", model.outputs)):
-        if not kept.size:
-            msg = (
-                f"Without {listed(names)} no {what} is left: {listed(every)} {'acts on' if what == 'input' else 'shows'}"
-                f" nothing else. Give the model another {what} by select() first."
-            )
-            raise SignalNameError(msg, names=every)
+    _require_some(inputs, model.inputs, names, "input", "acts on")
+    _require_some(outputs, model.outputs, names, "output", "shows")
     return Kept(np.flatnonzero(~out), inputs, outputs)
+
+
+def _require_some(kept: IndexArray, every: tuple[str, ...], out: tuple[str, ...], what: str, does: str) -> None:
+    if not kept.size:
+        msg = (
+            f"Without {listed(out)} no {what} is left: {listed(every)} {does} nothing else. Give the model another "
+            f"{what} by select() first."
+        )
+        raise SignalNameError(msg, names=every)
 
 
 def _still_used(columns: Sequence[ModelMatrix], direct: Sequence[ModelMatrix], out: BoolArray) -> IndexArray:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import answer_of, real_numbers
+from halfdof_ctrl.base.doors import answer_of, real_numbers, shown
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.names import unknown_name_error
 
@@ -72,10 +72,10 @@ def constant_inputs(given: Any, names: tuple[str, ...]) -> FloatArray:  # noqa: 
         values = np.asarray(0.0 if given is None else given, dtype=float)
         values = np.array(np.broadcast_to(values, (len(names),)))
     except (TypeError, ValueError) as cause:
-        msg = f"inputs must be a number, or one for each of {len(names)} inputs, not {given!r}."
+        msg = f"inputs must be a number, or one for each of {len(names)} inputs, not {shown(given)}."
         raise MatrixError(msg, matrix="inputs") from cause
     if not np.isfinite(values).all():
-        msg = f"inputs must be finite numbers, not {given!r}."
+        msg = f"inputs must be finite numbers, not {shown(given)}."
         raise MatrixError(msg, matrix="inputs")
     return values
 

@@ -8,7 +8,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.doors import real_number, real_numbers
 from halfdof_ctrl.base.errors import MatrixError
-from halfdof_ctrl.base.names import motion_names, unknown_name_error
+from halfdof_ctrl.base.names import by_name, motion_names
 from halfdof_ctrl.model.nonlinear import Values
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 from halfdof_ctrl.nonlinear.recovery import motion_at
@@ -39,9 +39,7 @@ def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Valu
     dofs = reduction.model.dofs
     names = (*motion_names(dofs, 0), *motion_names(dofs, 1))
     given = np.full(len(names), np.nan)
-    for name, value in initial.items():
-        if name not in names:
-            raise unknown_name_error(name, "displacement or velocity", names)
+    for name, value in by_name(initial, names, "displacement or velocity").items():
         given[names.index(name)] = real_number(value, str(name))
     if np.isinf(given).any():
         msg = "Initial displacements and velocities must be finite numbers."

@@ -17,7 +17,7 @@ import numpy.typing as npt
 import scipy.integrate
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, real_numbers, shown
 from halfdof_ctrl.base.errors import (
     InterruptedResponseWarning,
     MatrixError,
@@ -269,11 +269,7 @@ def _response(
 
 
 def _checked_times(timepts: npt.ArrayLike) -> FloatArray:
-    try:
-        times = np.array(timepts, dtype=float)
-    except (TypeError, ValueError, OverflowError) as cause:
-        msg = f"timepts must be rising numbers [s], not {timepts!r}."
-        raise MatrixError(msg, matrix="timepts") from cause
+    times = np.array(real_numbers(timepts, "timepts", "rising numbers [s]"))
     if times.ndim != 1 or times.size == 0 or not np.isfinite(times).all() or not (np.diff(times) > 0.0).all():
         msg = "timepts must be one or more finite times [s] that rise from one to the next."
         raise MatrixError(msg, matrix="timepts")
@@ -282,8 +278,8 @@ def _checked_times(timepts: npt.ArrayLike) -> FloatArray:
 
 def _require_valid(rtol: float, method: str) -> None:
     if not is_choice(method, METHODS):
-        msg = f"method must be one of {', '.join(METHODS)}, not {method!r}."
+        msg = f"method must be one of {', '.join(METHODS)}, not {shown(method)}."
         raise ParameterError(msg, parameter="method", value=method)
     if not (isinstance(rtol, int | float) and LEAST_STEP_TOLERANCE <= rtol < 1.0):
-        msg = f"rtol = {rtol!r}, but a relative tolerance lies between 1e-13, near rounding, and 1."
+        msg = f"rtol = {shown(rtol)}, but a relative tolerance lies between 1e-13, near rounding, and 1."
         raise ParameterError(msg, parameter="rtol", value=rtol)

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.doors import items_of
+from halfdof_ctrl.base.doors import items_of, shown
 from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -133,7 +133,7 @@ def _with_joined_models(
         else items_of(joints, "joints", "a list of Rigid, Spring, Damper and Joint", parameter="joints")
     ):
         if not isinstance(cast("object", joint), Rigid | Spring | Damper | Joint):
-            msg = f"{joint!r} is no joint: take Rigid, Spring, Damper or Joint."
+            msg = f"{shown(joint)} is no joint: take Rigid, Spring, Damper or Joint."
             raise ParameterError(msg, parameter="joints", value=joint)
         if not isinstance(joint, Joint):
             found.append(joint)

@@ -18,7 +18,7 @@ import numpy as np
 
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.base.names import as_tuple, listed
+from halfdof_ctrl.base.names import as_tuple, by_name, listed
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -92,8 +92,8 @@ def sized(
     ParameterError
         Negative, NaN, Inf or no number.
     """
-    return {axis: checked(value[axis] if isinstance(value, Mapping) else value, symbol, unit, positive=positive)
-            for axis in axes}  # fmt: skip
+    sizes = by_name(value, axes, "axis") if isinstance(value, Mapping) else dict.fromkeys(axes, value)
+    return {axis: checked(sizes[axis], symbol, unit, positive=positive) for axis in axes}
 
 
 def checked(value: object, symbol: str, unit: str, *, positive: bool = False) -> float:

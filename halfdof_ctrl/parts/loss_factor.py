@@ -215,7 +215,7 @@ def _tabulated(table: object, band: tuple[float, float]) -> Loss:
         f, eta = (np.asarray(column, dtype=float) for column in cast("Any", table))
         sound = f.ndim == 1 and f.shape == eta.shape and f.size > 1 and bool((np.diff(f) > 0.0).all() and f[0] > 0.0)
         sound = sound and bool((eta > 0.0).all())
-    except (TypeError, ValueError):
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
         sound = False
     if not sound or f[0] > band[0] * (1.0 + STIFFNESS_ROUNDING) or f[-1] < band[1] * (1.0 - STIFFNESS_ROUNDING):
         msg = (
@@ -328,11 +328,11 @@ def _names(dofs: tuple[str, ...], count: int, rank: int) -> list[str]:
 def _checked_band(band: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = (float(value) for value in band)
-    except (TypeError, ValueError, OSError, OverflowError) as cause:
-        msg = f"band = {band!r}, but it must be two frequencies (f1, f2) [Hz]."
+    except Exception as cause:
+        msg = f"band = {shown(band)}, but it must be two frequencies (f1, f2) [Hz]."
         raise ParameterError(msg, parameter="band", value=band) from cause
     if not (np.isfinite(low) and np.isfinite(high) and 0.0 < low < high):
-        msg = f"band = {band!r}, but it must be two positive frequencies [Hz], the lower one first."
+        msg = f"band = {shown(band)}, but it must be two positive frequencies [Hz], the lower one first."
         raise ParameterError(msg, parameter="band", value=band)
     return low, high
 
@@ -347,13 +347,13 @@ def _positive(value: object, parameter: str, unit: str) -> float:
 
 def _require_options(keep: Keep, branches: int | None, tol: float) -> None:
     if not is_choice(keep, get_args(Keep)):
-        msg = f"keep must be one of {listed(get_args(Keep))}, not {keep!r}."
+        msg = f"keep must be one of {listed(get_args(Keep))}, not {shown(keep)}."
         raise ParameterError(msg, parameter="keep", value=keep)
     if branches is not None and not (
         is_real_number(branches) and isinstance(branches, int | np.integer) and 0 < branches <= MOST_BRANCHES
     ):
-        msg = f"branches = {branches!r}, but it must be a whole number from 1 to {MOST_BRANCHES}."
+        msg = f"branches = {shown(branches)}, but it must be a whole number from 1 to {MOST_BRANCHES}."
         raise ParameterError(msg, parameter="branches", value=branches)
     if not (isinstance(tol, int | float) and 0.0 < tol < 1.0):
-        msg = f"tol = {tol!r}, but it is a relative error: a number between 0 and 1, such as 0.02."
+        msg = f"tol = {shown(tol)}, but it is a relative error: a number between 0 and 1, such as 0.02."
         raise ParameterError(msg, parameter="tol", value=tol)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray, checked_matrix
-from halfdof_ctrl.base.doors import real_numbers, require_mapping, require_switch
+from halfdof_ctrl.base.doors import real_numbers, require_mapping, require_switch, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import FORCE_PREFIX
 from halfdof_ctrl.model.mechss import mechss
@@ -54,7 +54,7 @@ def point_mass(m: float, axes: Axes = "z") -> SecondOrderModel:
     """
     found = part_axes(axes)
     if not set(found) <= set(AXES[:TRANSLATIONS]):
-        msg = f"axes = {axes!r}, but a point mass moves along x, y, z alone. Take rigid_body for rotations."
+        msg = f"axes = {shown(axes)}, but a point mass moves along x, y, z alone. Take rigid_body for rotations."
         raise ParameterError(msg, parameter="axes", value=axes)
     mass = checked(m, "m", "kg", positive=True)
     return mechss(mass * np.eye(len(found)), None, None, dofs=found, name="point_mass")
@@ -121,13 +121,14 @@ def _lever(name: str, place: Sequence[float]) -> FloatArray:
     """Give the (6, 6) motion of a point for the motions of the body."""
     try:
         X, Y, Z = (float(value) for value in place)
-    except (TypeError, ValueError) as cause:
+    except Exception as cause:
         msg = (
-            f"Point {name!r} is at {place!r}, but a place is three numbers (x, y, z) [m] seen from the centre of mass."
+            f"Point {shown(name)} is at {shown(place)}, but a place is three numbers (x, y, z) [m] seen from the "
+            "centre of mass."
         )
         raise ParameterError(msg, parameter=name, value=place) from cause
     if not np.isfinite([X, Y, Z]).all():
-        msg = f"Point {name!r} is at {place!r}: every coordinate must be a finite number [m]."
+        msg = f"Point {shown(name)} is at {shown(place)}: every coordinate must be a finite number [m]."
         raise ParameterError(msg, parameter=name, value=place)
     rows = np.eye(len(AXES))
     rows[:TRANSLATIONS, TRANSLATIONS:] = [[0.0, Z, -Y], [-Z, 0.0, X], [Y, -X, 0.0]]

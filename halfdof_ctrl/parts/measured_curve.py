@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.doors import is_choice, is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
 
@@ -54,8 +55,8 @@ def measured_curve(
         Lists of different lengths or fewer than two points; NaN, Inf or zero; a frequency that is not positive; loss
         that is negative beyond its scatter; a static stiffness above the curve; an unknown weight.
     """
-    if weight not in WEIGHTS:
-        msg = f"weight must be one of {listed(WEIGHTS)}, not {weight!r}."
+    if not is_choice(weight, WEIGHTS):
+        msg = f"weight must be one of {listed(WEIGHTS)}, not {shown(weight)}."
         raise ParameterError(msg, parameter="weight", value=weight)
     f, K = _checked_points(frequency, stiffness)
     order = np.argsort(f, kind="stable")
@@ -96,7 +97,7 @@ def typical_scatter(values: npt.NDArray[np.inexact]) -> float:
 def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple[FloatArray, ComplexArray]:
     try:
         f, K = np.array(frequency, dtype=float), np.array(stiffness, dtype=complex)
-    except (TypeError, ValueError, OverflowError) as cause:
+    except Exception as cause:
         msg = f"frequency must be a list of real numbers [Hz] and stiffness one of complex numbers: {cause}."
         raise ParameterError(msg, parameter="stiffness", value=None) from cause
     if f.ndim != 1 or f.shape != K.shape or f.size < FEWEST:
@@ -143,12 +144,12 @@ def _require_loss(f: FloatArray, K: ComplexArray) -> None:
 def _checked_static(static: float | None, f: FloatArray, K: ComplexArray) -> float | None:
     if static is None:
         return None
-    number = float(static) if isinstance(static, int | float | np.integer | np.floating) else np.nan
+    number = float(static) if is_real_number(static) else np.nan
     largest = float(np.abs(K).max())
     if not (np.isfinite(number) and 0.0 <= number <= largest):
         msg = (
-            f"static_stiffness = {static!r}, but it must be a number from 0 to {largest:.6g}, the largest stiffness "
-            f"that was measured ({f[0]:.4g} to {f[-1]:.4g} Hz): a passive part is softest at rest."
+            f"static_stiffness = {shown(static)}, but it must be a number from 0 to {largest:.6g}, the largest "
+            f"stiffness that was measured ({f[0]:.4g} to {f[-1]:.4g} Hz): a passive part is softest at rest."
         )
         raise ParameterError(msg, parameter="static_stiffness", value=static)
     return number

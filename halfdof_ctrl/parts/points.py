@@ -8,6 +8,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 
 from halfdof_ctrl.base.arrays import Matrix
+from halfdof_ctrl.base.doors import shown
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import checked_names, listed, motions
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
@@ -42,7 +43,7 @@ class Points:
             )
             near = [other for other in self.rows if not part or self.part_of[other] == part]
             where = f"part {part} has" if part else "the parts have"
-            msg = f"No part has a point {name!r}. Points are called part_dof; {where} {listed(near, most=24)}."
+            msg = f"No part has a point {shown(name)}. Points are called part_dof; {where} {listed(near, most=24)}."
             raise SignalNameError(msg, names=(str(name),))
         return found
 
@@ -88,7 +89,8 @@ def points_of(parts: Mapping[str, SecondOrderModel]) -> Points:
     others: list[str] = []
     for part, model in parts.items():
         if not isinstance(cast("object", model), SecondOrderModel):
-            msg = f"Part {part!r} is a {type(model).__name__}, but it must be a model, such as mechss or zener make it."
+            kind = type(model).__name__
+            msg = f"Part {shown(part)} is a {kind}, but it must be a model, such as mechss or zener make it."
             raise ParameterError(msg, parameter=part, value=model)
         for i, dof in enumerate(model.dofs):
             _add(rows, part_of, f"{part}_{dof}", {len(dofs) + i: 1.0}, part)

@@ -24,7 +24,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from halfdof_ctrl.base.doors import items_of
+from halfdof_ctrl.base.doors import items_of, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.parts.links import Axes, Link, Size, linked, part_axes, sized
@@ -251,6 +251,6 @@ def _pair(branch: object, number: int) -> tuple[Size, Size]:
         or np.ndim(branch) == 0
         or len(branch) != PAIR
     ):
-        msg = f"Branch {number} is {branch!r}, but each must be a pair (k_i [N/m], c_i [N s/m])."
+        msg = f"Branch {number} is {shown(branch)}, but each must be a pair (k_i [N/m], c_i [N s/m])."
         raise ParameterError(msg, parameter="branches", value=branch)
     return branch[0], branch[1]

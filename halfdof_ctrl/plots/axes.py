@@ -62,7 +62,10 @@ def prepared_axes(
         if columns > 1:
             _small_text(axes)
         return axes
-    given = np.asarray(ax, dtype=object)
+    try:
+        given = np.asarray(ax, dtype=object)
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
+        given = np.array(None)
     if not all(isinstance(entry, Axes) for entry in given.flat):
         msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."
         raise ParameterError(msg, parameter="ax", value=ax)

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import require_switches, require_texts
+from halfdof_ctrl.base.doors import is_choice, require_switches, require_texts, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -230,8 +230,8 @@ def _prepared(ax: AxesLike, what: str) -> AxesArray:
 
 def _require_scales(xscale: str, yscale: str) -> None:
     for parameter, scale in (("xscale", xscale), ("yscale", yscale)):
-        if scale not in SCALES:
-            msg = f"{parameter} must be {' or '.join(SCALES)}, not {scale!r}."
+        if not is_choice(scale, SCALES):
+            msg = f"{parameter} must be {' or '.join(SCALES)}, not {shown(scale)}."
             raise ParameterError(msg, parameter=parameter, value=scale)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from halfdof_ctrl.base.arrays import ComplexArray
-from halfdof_ctrl.base.doors import require_mapping, require_switches, require_texts, wrong_object
+from halfdof_ctrl.base.doors import require_mapping, require_switches, require_texts, shown, wrong_object
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.model.mechss import mechss
@@ -125,7 +125,7 @@ def _checked_kind(result: SweepResult, kind: str | None) -> str:
         raise wrong_object("kind", "'bode' or 'poles'", kind, parameter="kind")
     wanted = kind or ("poles" if result.response is None else "bode")
     if wanted not in there:
-        msg = f"kind = {kind!r}, but a sweep is drawn as 'bode' or 'poles'."
+        msg = f"kind = {shown(kind)}, but a sweep is drawn as 'bode' or 'poles'."
         raise ParameterError(msg, parameter="kind", value=kind)
     if there[wanted] is None:
         lacking = "frequency response: give omega" if wanted == "bode" else "poles: let compute have 'poles'"

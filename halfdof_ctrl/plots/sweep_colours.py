@@ -11,7 +11,7 @@ import numpy.typing as npt
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
 
-from halfdof_ctrl.base.doors import require_mapping, require_text
+from halfdof_ctrl.base.doors import require_mapping, require_text, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.plots.axes import AxesArray
@@ -120,7 +120,7 @@ def _kept(result: SweepResult, at: Mapping[str, object]) -> Numbers:
 def _require_parameter(result: SweepResult, name: str) -> None:
     if name not in result.parameters:
         known = listed(list(result.parameters)) or "none"
-        msg = f"The sweep varied no parameter {name!r}. It varied: {known}."
+        msg = f"The sweep varied no parameter {shown(name)}. It varied: {known}."
         raise ParameterError(msg, parameter=name, value=name)
 
 

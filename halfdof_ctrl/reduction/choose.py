@@ -5,7 +5,7 @@ with it, and what of that a user must know is warned of once, here.
 """
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import ModelSizeError, ParameterError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.doors import checked_model
@@ -119,8 +119,8 @@ def _sparsely_solved(model: SecondOrderModel, tol: float | None, method: MethodN
 
 def _require_valid(tol: float | None, method: MethodName | None) -> None:
     if method is not None and not is_choice(method, METHODS):
-        msg = f"method must be 'selection', 'orthogonal', 'deflation' or None, not {method!r}."
+        msg = f"method must be 'selection', 'orthogonal', 'deflation' or None, not {shown(method)}."
         raise ParameterError(msg, parameter="method", value=method)
     if tol is not None and not (isinstance(tol, int | float) and 0.0 <= tol < 1.0):
-        msg = f"tol = {tol!r}, but it is a relative size: a number from 0 to below 1, such as 1e-12."
+        msg = f"tol = {shown(tol)}, but it is a relative size: a number from 0 to below 1, such as 1e-12."
         raise ParameterError(msg, parameter="tol", value=tol)

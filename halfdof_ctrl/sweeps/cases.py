@@ -18,6 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
+from halfdof_ctrl.base.doors import shown
 from halfdof_ctrl.base.errors import ParameterError
 
 Values: TypeAlias = npt.NDArray[Any]  #: numbers, or objects where the values are something else
@@ -182,7 +183,7 @@ def _columns(parameters: Iterable[object]) -> dict[str, Values]:
 def _require_names(names: Mapping[str, object]) -> None:
     for name in names:
         if not (isinstance(name, str) and name.isidentifier()):
-            msg = f"{name!r} cannot be a parameter: parameters are named as in Python, such as C_h."
+            msg = f"{shown(name)} cannot be a parameter: parameters are named as in Python, such as C_h."
             raise ParameterError(msg, parameter=str(name), value=name)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
@@ -212,8 +212,8 @@ def _checked_quantities(compute: object) -> tuple[Quantity, ...]:
     functions = [quantity for quantity in given if callable(quantity)]
     if not given or len(functions) > 1 or any(not callable(one) and not is_choice(one, QUANTITIES) for one in given):
         msg = (
-            f"compute = {compute!r}, but it must be 'poles', 'response', a function of the model, or a list of these "
-            "with one function at most. Let one function give an array of all its numbers."
+            f"compute = {shown(compute)}, but it must be 'poles', 'response', a function of the model, or a list of "
+            "these with one function at most. Let one function give an array of all its numbers."
         )
         raise ParameterError(msg, parameter="compute", value=compute)
     return given

@@ -11,7 +11,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     HalfdofError,
@@ -88,7 +88,7 @@ def dss2ss(
     (['voltage'], [-0.166666667])
     """
     if not is_choice(improper, ("refuse", "drop")):
-        msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
+        msg = f"improper must be 'refuse' or 'drop', not {shown(improper)}."
         raise ParameterError(msg, parameter="improper", value=improper)
     if isinstance(A, SecondOrderModel):
         if any(value is not None for value in (B, C, D, E, states, inputs, outputs, name)):

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.doors import real_numbers
 from halfdof_ctrl.base.errors import (
     NoStateSpaceError,
     ParameterError,
@@ -270,11 +271,7 @@ def system_frequencies(sys: control.StateSpace, model: SecondOrderModel | None =
 
 def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
     """Read frequencies as a 1D array of finite numbers that are not negative [rad/s]."""
-    try:
-        frequencies = np.atleast_1d(np.asarray(omega, dtype=float))
-    except (TypeError, ValueError, OverflowError) as cause:
-        msg = f"omega must be real numbers [rad/s]: {cause}."
-        raise ParameterError(msg, parameter="omega", value=omega) from cause
+    frequencies = np.atleast_1d(real_numbers(omega, "omega", "real numbers [rad/s]"))
     if frequencies.ndim != 1 or frequencies.size == 0 or not (np.isfinite(frequencies) & (frequencies >= 0.0)).all():
         msg = "omega must be a list of one or more finite frequencies [rad/s], none of them negative."
         raise ParameterError(msg, parameter="omega", value=omega)

@@ -12,9 +12,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.base.doors import is_choice
-from halfdof_ctrl.base.errors import EnergyFormError, InconsistentStateError, ParameterError
+from halfdof_ctrl.base.arrays import FloatArray, checked_matrix, read_only
+from halfdof_ctrl.base.doors import is_choice, real_numbers, shown
+from halfdof_ctrl.base.errors import EnergyFormError, InconsistentStateError, MatrixError, ParameterError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -60,19 +60,28 @@ class StateMap:
 
     def to_dofs(self, x: npt.ArrayLike) -> FloatArray:
         """Return the displacements and velocities that are the states of ``mech2ss(model)``, for (N, ...) states."""
-        return np.asarray(np.tensordot(self.T_inverse, np.asarray(x, dtype=float), axes=1))
+        return np.asarray(np.tensordot(self.T_inverse, self._numbers(x, "x", 0), axes=1))
 
     def from_dofs(self, x: npt.ArrayLike) -> FloatArray:
         """Return these states for (N, ...) states of ``mech2ss(model)``."""
-        return np.asarray(np.tensordot(self.T, np.asarray(x, dtype=float), axes=1))
+        return np.asarray(np.tensordot(self.T, self._numbers(x, "x", 0), axes=1))
 
     def gain_on_dofs(self, K: npt.ArrayLike) -> FloatArray:
         """Return the gain on the states of ``mech2ss(model)`` that does what K, (m, N), does on these."""
-        return np.asarray(np.asarray(K, dtype=float) @ self.T)
+        return np.asarray(self._numbers(K, "K", -1) @ self.T)
 
     def weight_from_dofs(self, Q: npt.ArrayLike) -> FloatArray:
         """Return the weight on these states that is Q, (N, N), on those of ``mech2ss(model)``."""
-        return np.asarray(self.T_inverse.T @ np.asarray(Q, dtype=float) @ self.T_inverse)
+        return np.asarray(self.T_inverse.T @ checked_matrix(Q, "Q", self.A.shape) @ self.T_inverse)
+
+    def _numbers(self, value: npt.ArrayLike, letter: str, axis: int) -> FloatArray:
+        """Read numbers of which one axis is that of the states."""
+        numbers = real_numbers(value, letter, "real numbers")
+        if numbers.ndim == 0 or numbers.shape[axis] != len(self.A):
+            where = "row" if axis == 0 else "column"
+            msg = f"{letter} must have a {where} for each of {len(self.A)} states, but its shape is {numbers.shape}."
+            raise MatrixError(msg, matrix=letter)
+        return numbers
 
     @property
     def output(self) -> Signal:
@@ -190,7 +199,7 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
 def require_kind(states: str) -> None:
     """Refuse a kind of states that there is not."""
     if not is_choice(states, KINDS):
-        msg = f"states must be one of {', '.join(map(repr, KINDS))}, not {states!r}."
+        msg = f"states must be one of {', '.join(map(repr, KINDS))}, not {shown(states)}."
         raise ParameterError(msg, parameter="states", value=states)
 
 

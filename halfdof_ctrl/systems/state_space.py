@@ -12,7 +12,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ImproperError,
@@ -110,7 +110,7 @@ def mech2ss(
            [-4.,  0.]])
     """
     if not is_choice(improper, ("refuse", "drop")):
-        msg = f"improper must be 'refuse' or 'drop', not {improper!r}."
+        msg = f"improper must be 'refuse' or 'drop', not {shown(improper)}."
         raise ParameterError(msg, parameter="improper", value=improper)
     require_kind(states)
     if isinstance(model, SecondOrderModel | ExactReduction):

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.doors import is_choice
+from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
 from halfdof_ctrl.descriptor.regularity import require_regular
@@ -327,7 +327,7 @@ def _driven(
 
 def _require_transmissibility(kind: object) -> None:
     if not is_choice(kind, TRANSMISSIBILITY_KINDS):
-        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {kind!r}."
+        msg = f"kind must be {' or '.join(TRANSMISSIBILITY_KINDS)}, not {shown(kind)}."
         raise ParameterError(msg, parameter="kind", value=kind)
 
 

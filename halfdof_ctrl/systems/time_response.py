@@ -16,7 +16,7 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.doors import real_numbers
 from halfdof_ctrl.base.errors import HalfdofError, ParameterError
-from halfdof_ctrl.base.names import control_label, control_labels, unknown_name_error
+from halfdof_ctrl.base.names import by_name, control_label, control_labels
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -279,9 +279,7 @@ def _histories(inputs: Histories, names: tuple[str, ...], count: int) -> FloatAr
     values = np.zeros((len(names), count))
     try:
         if isinstance(inputs, Mapping):
-            for name, history in inputs.items():
-                if name not in names:
-                    raise unknown_name_error(name, "input", names)
+            for name, history in by_name(inputs, names, "input").items():
                 values[names.index(name)] = real_numbers(history, "inputs", "histories of real numbers")
         else:
             values[:] = real_numbers(inputs, "inputs", "histories of real numbers")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.doors import real_number, real_numbers, shown, wrong_object
 from halfdof_ctrl.base.errors import InconsistentStateError, MatrixError, ParameterError
-from halfdof_ctrl.base.names import motion_names, unknown_name_error
+from halfdof_ctrl.base.names import by_name, motion_names, unknown_name_error
 
 CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
 
@@ -31,7 +31,11 @@ def require_response(response: object) -> None:
     WrongObjectError
         It has no times, or no states.
     """
-    if isinstance(response, type) or any(getattr(response, part, None) is None for part in ("t", "x")):
+    try:
+        whole = not isinstance(response, type) and all(getattr(response, part, None) is not None for part in ("t", "x"))
+    except Exception:  # noqa: BLE001  # the object is the user's
+        whole = False
+    if not whole:
         remedy = "Compute it by control.forced_response of the system that mech2ss made, with its states."
         raise wrong_object("recover", "a control.TimeResponseData", response, remedy, parameter="response")
 
@@ -55,7 +59,7 @@ class RecoveredMotion:
         """
         for derivative, history in enumerate((self.displacement, self.velocity)):
             names = motion_names(self.dofs, derivative)
-            if name in names:
+            if isinstance(name, str) and name in names:
                 return np.asarray(history[names.index(name)])
         raise unknown_name_error(name, "motion", (*self.dofs, *motion_names(self.dofs, 1)))
 
@@ -79,9 +83,7 @@ def given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ..
     """Read displacements or velocities as an array with NaN where they are open."""
     if isinstance(given, Mapping):
         values = np.full(len(dofs), np.nan)
-        for name, value in given.items():
-            if name not in dofs:
-                raise unknown_name_error(name, "DOF", dofs)
+        for name, value in by_name(given, dofs, "DOF").items():
             values[dofs.index(name)] = real_number(value, f"{what} of {name}")
         return values
     values = real_numbers(given, what, f"one real number for each of the {len(dofs)} DOFs")

@@ -13,7 +13,11 @@ from itertools import zip_longest
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, is_zero, unit_matrix
+from halfdof_ctrl.base.doors import shown
+from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel
+
+HIGHEST_DERIVATIVE = 20  #: of a displacement, far more than any use
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,7 +55,16 @@ class StateEquations:
     shift: tuple[FloatArray, ...]  #: E_0, E_1, ... of equation (5), (N, m) each
 
     def motion(self, derivative: int) -> Signal:
-        """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs."""
+        """Return q, q' or q'' (derivative 0, 1, 2) of all n DOFs as functions of state and inputs.
+
+        Raises
+        ------
+        ParameterError
+            `derivative` is no whole number from 0 to 20.
+        """
+        if not isinstance(derivative, int | np.integer) or not 0 <= derivative <= HIGHEST_DERIVATIVE:
+            msg = f"derivative = {shown(derivative)}, but it must be a whole number from 0 to {HIGHEST_DERIVATIVE}."
+            raise ParameterError(msg, parameter="derivative", value=derivative)
         signal = self.displacement
         for _ in range(derivative):
             signal = signal.derivative(self.A, self.B)

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.base.doors import is_real_number
+from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ComplexModelError, MatrixError, ModelSizeError, ParameterError, SingularPencilError
 from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.base.sparse_arrays import as_sparse
@@ -97,7 +97,7 @@ def _require(model: SecondOrderModel, loss_factor: float | None) -> None:
         raise ComplexModelError(msg, matrices=model.complex_matrices)
     sound = loss_factor is None or (is_real_number(loss_factor) and np.isfinite(loss_factor))
     if not sound or (loss_factor or 0.0) < 0.0:
-        msg = f"loss_factor = {loss_factor!r}, but it must be a number that is not negative."
+        msg = f"loss_factor = {shown(loss_factor)}, but it must be a number that is not negative."
         raise ParameterError(msg, parameter="loss_factor", value=loss_factor)
     for letter, part in (("M", model.M), ("K", model.K.real), ("K", model.K.imag)):
         asymmetry = is_unsymmetric(as_sparse(np.ascontiguousarray(part)))

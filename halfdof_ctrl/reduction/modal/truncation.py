@@ -26,15 +26,17 @@ from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
     ParameterError,
+    SingularPencilError,
     TruncationWarning,
     give_warning,
 )
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.base.sparse_arrays import as_sparse
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
+from halfdof_ctrl.model.singular import Cause, singular_pencil_error
 from halfdof_ctrl.reduction.modal.craig_bampton import KEPT_MODES_MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 from halfdof_ctrl.reduction.modal.projection import IMAGINARY_STIFFNESS, projected
@@ -162,6 +164,7 @@ def truncate_modes(
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     whole = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
+    _require_attached(model, whole)
     parts = dict(whole)
     if model.is_complex:  # modes are those of the real part; both are projected on them
         parts |= {"K": csc_array(parts["K"].real), IMAGINARY_STIFFNESS: csc_array(parts["K"].imag)}
@@ -169,8 +172,24 @@ def truncate_modes(
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
     band = (top / 10.0**DECADES, top)
-    resonances = resonance_errors(whole, small, basis, band)
+    try:
+        resonances = resonance_errors(whole, small, basis, band)
+    except RuntimeError as cause:  # the full model is exactly singular at one of its resonances, thus everywhere
+        msg = "Some DOFs of the full model move together without a force and without mass; mech2ss says which."
+        raise SingularPencilError(msg, dofs=()) from cause
     return _measured(model, small, motions, resonances, (band, points))
+
+
+def _require_attached(model: SecondOrderModel, parts: dict[str, SparseMatrix]) -> None:
+    """Refuse DOFs without any entry, which would be kept and could move in any way."""
+    filled = np.zeros(len(model.dofs))
+    for letter in "MCK":
+        size: Any = abs(parts[letter])
+        filled += size.sum(axis=0) + size.sum(axis=1)
+    loose = tuple([model.dofs[place] for place in np.flatnonzero(filled == 0.0).tolist()])
+    if loose:
+        fact = f"{len(loose)} of {len(model.dofs)} DOFs have no entry in M, C and K"
+        raise singular_pencil_error(dofs=loose, equations=loose, fact=fact, causes=[Cause("unattached", loose)])
 
 
 def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None:
@@ -181,7 +200,7 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
         msg = f"f_max = {shown(f_max)} Hz, but it must be a positive frequency."
         raise ParameterError(msg, parameter="f_max", value=f_max)
     if n_modes is not None and not (isinstance(n_modes, int | np.integer) and n_modes > 0):
-        msg = f"n_modes = {n_modes!r}, but it must be a whole number, at least 1."
+        msg = f"n_modes = {shown(n_modes)}, but it must be a whole number, at least 1."
         raise ParameterError(msg, parameter="n_modes", value=n_modes)
     if not isinstance(points, int | np.integer) or not 1 <= points <= MOST_POINTS:
         msg = f"points = {shown(points)}, but the error is to be measured at a whole number of frequencies, 1 to 1e6."
