@@ -27,6 +27,7 @@ REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SMALLEST_SIZE = 1e-75  #: of the largest entry of a column, so that products of four have no underflow
 LARGEST_SIZE = 1e75  #: of an entry, so that products of four do not overflow
+SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -103,28 +104,39 @@ def checked_square_matrices(values: Sequence[object], letters: str, rows: str = 
         if size is None and checked[-1] is not None:
             size = (checked[-1].shape[0], checked[-1].shape[1])
         if checked[-1] is not None:
-            require_range(letter, np.abs(checked[-1]).max(axis=0))
+            sizes = np.abs(checked[-1])
+            require_range(letter, sizes.max(axis=0), sizes)
     size = size or (1, 1)  # nothing but the number 0
     return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
 
 
-def require_range(letter: str, largest: FloatArray, line: str = "column") -> None:
-    """Refuse numbers of which products overflow or vanish, such as subnormal ones.
+def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str = "column") -> None:
+    """Refuse numbers of which products overflow or vanish.
 
     Parameters
     ----------
     letter : str
         Of the matrix.
     largest : (k,) ndarray
-        Size of the largest entry of each column, or row. Entries that are small beside it do no harm.
+        Size of the largest entry of each column, or row. Entries that are small beside it do no harm, unless they are
+        subnormal.
+    sizes : ndarray
+        Sizes of all entries, of any shape.
     line : str
         What it is of.
 
     Raises
     ------
     MatrixError
-        One is above 1e75, or below 1e-75 but not zero.
+        One is above 1e75, or below 1e-75 but not zero; or an entry is subnormal.
     """
+    subnormal = sizes[(sizes > 0.0) & (sizes < SMALLEST_NORMAL)]
+    if subnormal.size:
+        msg = (
+            f"{letter} has an entry of the size {subnormal[0]:.1e}, which is subnormal: it has lost digits, and its "
+            "reciprocal overflows. Write what is nothing as 0."
+        )
+        raise MatrixError(msg, matrix=letter)
     wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))
     if wrong.size:
         place = int(wrong[0])

@@ -225,10 +225,14 @@ def real_numbers(value: Any, parameter: str, meaning: str) -> FloatArray:  # noq
     except Exception as cause:
         msg = f"{parameter} must be {meaning}, not {shown(value)}: {cause}."
         raise ParameterError(msg, parameter=parameter, value=value) from cause
-    if numbers is None or (given.dtype == object and any(isinstance(entry, str | bytes) for entry in given.flat)):
+    if numbers is None or (given.dtype == object and any(_is_no_number(entry) for entry in given.flat)):
         msg = f"{parameter} must be {meaning}, not {shown(value)}."
         raise ParameterError(msg, parameter=parameter, value=value)
     return numbers
+
+
+def _is_no_number(entry: object) -> bool:
+    return entry is None or isinstance(entry, str | bytes)
 
 
 def real_number(value: Any, parameter: str) -> float:  # noqa: ANN401  # whatever the user gave

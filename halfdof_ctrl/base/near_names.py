@@ -4,6 +4,8 @@ import difflib
 from collections.abc import Collection, Sequence
 
 CLOSE = 0.6  #: likeness from which a name is offered in place of an unknown one, as difflib has it
+CLOSE_SHORT = 0.5  #: the same for up to three letters, of which a single one may be another
+SHORT = 3
 MOST_OFFERED = 3  #: names in a message
 MOST_COMPARED = 2000  #: names that difflib compares, at some ten microseconds each
 MOST_LETTERS = 60  #: of a name whose slips are looked up one by one
@@ -25,7 +27,9 @@ def nearest_names(name: str, known: Collection[str]) -> list[str]:
         known = _candidates(wanted, known)
     folded = _folded(wanted)
     same = [other for other in known if _folded(other) == folded][:MOST_OFFERED]
-    near = difflib.get_close_matches(wanted, known, n=MOST_OFFERED, cutoff=CLOSE)
+    near = difflib.get_close_matches(
+        wanted, known, n=MOST_OFFERED, cutoff=CLOSE_SHORT if len(wanted) <= SHORT else CLOSE
+    )
     return list(dict.fromkeys((*same, *near)))[:MOST_OFFERED]
 
 

@@ -122,7 +122,7 @@ def checked_sparse_squares(values: Sequence[object], letters: str, rows: str = "
         for letter, value in zip(letters, without_short_forms(values, letters, rows=rows), strict=True)
     ]
     for letter, matrix in zip(letters, matrices, strict=True):
-        require_range(letter, largest_by_row_and_column(matrix)[1])
+        require_range(letter, largest_by_row_and_column(matrix)[1], np.abs(matrix.data))
     return matrices
 
 

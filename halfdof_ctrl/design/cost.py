@@ -84,7 +84,8 @@ def _square(value: object, letter: str, size: int, rows: str) -> FloatArray:
         value = np.full(size, value)
     full = full_square(without_short_forms((value,), (letter,), size, rows)[0])
     matrix = checked_matrix(np.zeros((size, size)) if full is None else full, letter, (size, size))
-    require_range(letter, np.abs(matrix).max(axis=0))
+    sizes = np.abs(matrix)
+    require_range(letter, sizes.max(axis=0), sizes)
     return matrix
 
 

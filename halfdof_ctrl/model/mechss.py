@@ -201,13 +201,15 @@ def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: 
     if is_sparse(like):
         matrix = sparse = checked_sparse_matrix(value, letter, (rows, columns))
         by_row, by_column = largest_by_row_and_column(sparse)
+        sizes = np.abs(sparse.data)
     else:
         matrix = dense = checked_matrix(value, letter, (rows, columns))
-        by_row, by_column = (np.abs(dense).max(axis=axis) for axis in (1, 0))
+        sizes = np.abs(dense)
+        by_row, by_column = (sizes.max(axis=axis) for axis in (1, 0))
     if letter[0] == "B":
-        require_range(letter, by_column)
+        require_range(letter, by_column, sizes)
     else:
-        require_range(letter, by_row, "row")
+        require_range(letter, by_row, sizes, "row")
     return matrix
 
 
