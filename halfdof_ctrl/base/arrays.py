@@ -27,7 +27,7 @@ REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SMALLEST_SIZE = 1e-75  #: of the largest entry of a column, so that products of four have no underflow
 LARGEST_SIZE = 1e75  #: of an entry, so that products of four do not overflow
-SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
+SMALLEST_ENTRY = 1e-200  #: beside larger ones in its column, so that its product with the largest keeps all digits
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -119,7 +119,7 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
         Of the matrix.
     largest : (k,) ndarray
         Size of the largest entry of each column, or row. Entries that are small beside it do no harm, unless they are
-        subnormal.
+        below 1e-200.
     sizes : ndarray
         Sizes of all entries, of any shape.
     line : str
@@ -128,13 +128,13 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
     Raises
     ------
     MatrixError
-        One is above 1e75, or below 1e-75 but not zero; or an entry is subnormal.
+        One is above 1e75, or below 1e-75 but not zero; or an entry is below 1e-200 but not zero.
     """
-    subnormal = sizes[(sizes > 0.0) & (sizes < SMALLEST_NORMAL)]
-    if subnormal.size:
+    vanishing = sizes[(sizes > 0.0) & (sizes < SMALLEST_ENTRY)]
+    if vanishing.size:
         msg = (
-            f"{letter} has an entry of the size {subnormal[0]:.1e}, which is subnormal: it has lost digits, and its "
-            "reciprocal overflows. Write what is nothing as 0."
+            f"{letter} has an entry of the size {vanishing[0]:.1e}, below {SMALLEST_ENTRY:.0e}: products with it vanish "
+            "or lose digits. Write what is nothing as 0."
         )
         raise MatrixError(msg, matrix=letter)
     wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))
@@ -259,12 +259,12 @@ def is_zero(matrix: Matrix) -> bool:
 
 
 def _numbers(value: object, letter: str) -> DenseMatrix:
-    if hasattr(value, "toarray") and hasattr(value, "nnz"):
-        value = _dense(value, letter)
     if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
         msg = f"{letter} has masked entries, which have no value. Fill them first."
         raise MatrixError(msg, matrix=letter)
     try:
+        if hasattr(value, "toarray") and hasattr(value, "nnz"):
+            value = _dense(value, letter)
         array = np.array(value)
         if array.dtype == REAL:
             return array
@@ -275,6 +275,8 @@ def _numbers(value: object, letter: str) -> DenseMatrix:
             return array.astype(np.float64)
         if array.dtype.kind == "c":
             return array.astype(np.complex128) if array.imag.any() else array.real.astype(np.float64)
+    except MatrixError:
+        raise
     except Exception as cause:
         msg = f"{letter} is not a matrix of numbers: {cause}."
         raise MatrixError(msg, matrix=letter) from cause

@@ -16,6 +16,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from halfdof_ctrl.base.arrays import LARGEST_SIZE, SMALLEST_SIZE
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import as_tuple, by_name, listed
@@ -111,6 +112,12 @@ def checked(value: object, symbol: str, unit: str, *, positive: bool = False) ->
         msg = (
             f"{symbol} = {shown(value)} {unit}, but it must be {allowed}, so that the part stays passive and its nodes "
             "held."
+        )
+        raise ParameterError(msg, parameter=symbol, value=value)
+    if number and not SMALLEST_SIZE <= number <= LARGEST_SIZE:
+        msg = (
+            f"{symbol} = {shown(value)} {unit}, but products of such numbers overflow or vanish: sizes from "
+            f"{SMALLEST_SIZE:.0e} to {LARGEST_SIZE:.0e} can be computed with. Choose other units."
         )
         raise ParameterError(msg, parameter=symbol, value=value)
     return number

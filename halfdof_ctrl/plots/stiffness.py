@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import is_choice, require_switches, require_texts, shown
+from halfdof_ctrl.base.doors import is_choice, items_of, require_switches, require_texts, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, force_names, listed, reaction_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -208,7 +208,8 @@ def transmissibility_plot(
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
     """Return the models as a list, and the text of each in the legend; an underscore keeps it out."""
     given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
-    models = list(given) if isinstance(given, Iterable) and not isinstance(given, np.ndarray) else []
+    listable = isinstance(given, Iterable) and not isinstance(given, np.ndarray)
+    models = items_of(given, "sysdata", "a model, or a list of some", parameter="sysdata") if listable else []
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
         msg = f"sysdata must be a SecondOrderModel or a list of some, not {type(sysdata).__name__}."
         raise ParameterError(msg, parameter="sysdata", value=sysdata)

@@ -91,7 +91,7 @@ def test_a_path_that_no_file_can_have_is_refused(path: str) -> None:
 def test_a_path_is_text_or_a_path() -> None:
     """Bytes and numbers are none."""
     require_path(Path("a"), "The path")
-    with pytest.raises(WrongObjectError, match="The path takes the path of a file.*; this is a bytes"):
+    with pytest.raises(WrongObjectError, match=r"The path takes the path of a file.*; this is a bytes"):
         require_path(b"a", "The path")
 
 
@@ -104,10 +104,9 @@ def test_a_function_that_fails_is_named_and_its_error_kept() -> None:
     def refused(x: float) -> float:
         raise MatrixError(str(x), matrix="K")
 
-    with pytest.raises(
-        ParameterError, match=r"inputs is called as a function of time; this failed: KeyError: 1\.0"
-    ) as e:
+    words = r"inputs is called as a function of time; this failed: KeyError: 1\.0"
+    with pytest.raises(ParameterError, match=words) as refusal:
         answer_of(broken, 1.0, parameter="inputs", meaning="a function of time")
-    assert isinstance(e.value.__cause__, KeyError)
+    assert isinstance(refusal.value.__cause__, KeyError)
     with pytest.raises(MatrixError):
         answer_of(refused, 1.0, parameter="inputs", meaning="a function of time")
