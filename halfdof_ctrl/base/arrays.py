@@ -133,8 +133,8 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
     vanishing = sizes[(sizes > 0.0) & (sizes < SMALLEST_ENTRY)]
     if vanishing.size:
         msg = (
-            f"{letter} has an entry of the size {vanishing[0]:.1e}, below {SMALLEST_ENTRY:.0e}: products with it vanish "
-            "or lose digits. Write what is nothing as 0."
+            f"{letter} has an entry of the size {vanishing[0]:.1e}, below {SMALLEST_ENTRY:.0e}: products with it "
+            "vanish or lose digits. Write what is nothing as 0."
         )
         raise MatrixError(msg, matrix=letter)
     wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))

@@ -1,7 +1,7 @@
 """Dynamic stiffness and loss angle, transmissibility and phase, over frequency as mount engineers read them."""
 
 from collections.abc import Iterable, Sequence
-from typing import Literal, TypeAlias, get_args
+from typing import Any, Literal, TypeAlias, get_args
 
 import control
 import numpy as np
@@ -208,8 +208,8 @@ def transmissibility_plot(
 def _models(sysdata: Models, label: Labels) -> tuple[list[SecondOrderModel], list[str]]:
     """Return the models as a list, and the text of each in the legend; an underscore keeps it out."""
     given: object = [sysdata] if isinstance(sysdata, SecondOrderModel) else sysdata
-    listable = isinstance(given, Iterable) and not isinstance(given, np.ndarray)
-    models = items_of(given, "sysdata", "a model, or a list of some", parameter="sysdata") if listable else []
+    listable: Any = given if isinstance(given, Iterable) and not isinstance(given, np.ndarray) else ()
+    models: list[SecondOrderModel] = items_of(listable, "sysdata", "a model, or a list of some", parameter="sysdata")
     if not models or not all(isinstance(model, SecondOrderModel) for model in models):
         msg = f"sysdata must be a SecondOrderModel or a list of some, not {type(sysdata).__name__}."
         raise ParameterError(msg, parameter="sysdata", value=sysdata)
