@@ -25,9 +25,9 @@ LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense fo
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
-SMALLEST_SIZE = 1e-75  #: of the largest entry of a column, so that products of four have no underflow
-LARGEST_SIZE = 1e75  #: of an entry, so that products of four do not overflow
-SMALLEST_ENTRY = 1e-200  #: beside larger ones in its column, so that its product with the largest keeps all digits
+SMALLEST_SIZE = 1e-140  #: of the largest entry of a column, so that the product of two has no underflow
+LARGEST_SIZE = 1e140  #: of an entry, so that the product of two does not overflow
+SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -119,7 +119,7 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
         Of the matrix.
     largest : (k,) ndarray
         Size of the largest entry of each column, or row. Entries that are small beside it do no harm, unless they are
-        below 1e-200.
+        subnormal.
     sizes : ndarray
         Sizes of all entries, of any shape.
     line : str
@@ -128,13 +128,13 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
     Raises
     ------
     MatrixError
-        One is above 1e75, or below 1e-75 but not zero; or an entry is below 1e-200 but not zero.
+        One is above 1e140, or below 1e-140 but not zero; or an entry is subnormal.
     """
-    vanishing = sizes[(sizes > 0.0) & (sizes < SMALLEST_ENTRY)]
-    if vanishing.size:
+    subnormal = sizes[(sizes > 0.0) & (sizes < SMALLEST_NORMAL)]
+    if subnormal.size:
         msg = (
-            f"{letter} has an entry of the size {vanishing[0]:.1e}, below {SMALLEST_ENTRY:.0e}: products with it "
-            "vanish or lose digits. Write what is nothing as 0."
+            f"{letter} has an entry of the size {subnormal[0]:.1e}, which is subnormal: it has lost digits, and its "
+            "reciprocal overflows. Write what is nothing as 0."
         )
         raise MatrixError(msg, matrix=letter)
     wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
-from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
+from halfdof_ctrl.base.errors import CloseDecisionWarning, HalfdofError, MatrixError, give_warning
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.growth import system_pencil
@@ -73,8 +73,17 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
         checked_model(model, "zeros"), "zeros", "Take those of a reduced model: zeros(truncate_modes(...))."
     )
     require_regular(model)
-    every = _independent(model)
-    found = invariant_zeros(system_pencil(model, *every))
+    try:
+        every = _independent(model)
+        found = invariant_zeros(system_pencil(model, *every))
+    except (ValueError, np.linalg.LinAlgError) as cause:
+        if isinstance(cause, HalfdofError):
+            raise
+        msg = (
+            f"Products of the entries of B, F and D overflow or vanish, so that zeros cannot be computed ({cause}). "
+            "Choose other units for inputs and outputs, or write what is nothing as 0."
+        )
+        raise MatrixError(msg, matrix="B") from cause
     if found.doubts:
         msg = (
             f"The number of zeros, {found.values.size}, is in doubt: {'; '.join(found.doubts)}. Inputs or outputs "

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.doors import shown
+from halfdof_ctrl.base.doors import real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -66,7 +66,7 @@ class PronyFit:
 
     def __call__(self, frequency: npt.ArrayLike) -> ComplexArray:
         """Give the dynamic stiffness of the model [N/m] at frequencies [Hz]."""
-        s = 2j * np.pi * np.asarray(frequency, dtype=float)
+        s = 2j * np.pi * real_numbers(frequency, "frequency", "real numbers [Hz]")
         return np.asarray(self.k0 + self.c0 * s + np.sum(self.k * s[..., None] / (s[..., None] + self.k / self.c), -1))
 
     @property

@@ -154,7 +154,7 @@ def test_a_missing_slope_is_found_at_rest_too(force: object, slope: float) -> No
         (lambda: laws.coulomb(1, 0), r"v0 = 0, but the rate over which friction turns round must be positive"),
         (lambda: laws.table([0, 1], [0, 1, 2]), r"two rows of the same 2 or more numbers"),
         (lambda: laws.table([0, 0], [0, 1]), r"x must rise from point to point"),
-        (lambda: laws.table(["a", 1], [0, 1]), r"x and f must be real numbers"),  # type: ignore[arg-type]
+        (lambda: laws.table(["a", 1], [0, 1]), r"table: x must be real numbers"),  # type: ignore[arg-type]
         (lambda: laws.table([0, 1], [0, 1], extend="flat"), r"extend must be \"linear\""),  # type: ignore[arg-type]
         (lambda: Law(3), r"The force of a law must be a function"),  # type: ignore[arg-type]
         (lambda: Law(np.tanh, bounds=(1, -1)), r"The bounds of a law must be two numbers"),
