@@ -278,7 +278,7 @@ def _numbers(value: object, letter: str) -> DenseMatrix:
     except MatrixError:
         raise
     except Exception as cause:
-        msg = f"{letter} is not a matrix of numbers: {cause}."
+        msg = f"{letter} is not a matrix of numbers: {str(cause).rstrip('.')}."
         raise MatrixError(msg, matrix=letter) from cause
     msg = f"{letter} holds entries of type {array.dtype} where numbers are needed. Convert them first."
     raise MatrixError(msg, matrix=letter)

@@ -84,14 +84,18 @@ def is_real_number(value: object) -> bool:
 
 
 def require_mapping(value: object, parameter: str, meaning: str) -> None:
-    """Refuse what is no mapping.
+    """Refuse what is no mapping, or one that does not give what it holds.
 
     Raises
     ------
     WrongObjectError
         It is none.
     """
-    if not isinstance(value, Mapping):
+    try:
+        sound = isinstance(value, Mapping) and list(value.items()) is not None
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
+        sound = False
+    if not sound:
         raise wrong_object(parameter, f"a mapping {meaning}", value, parameter=parameter)
 
 
@@ -223,7 +227,7 @@ def real_numbers(value: Any, parameter: str, meaning: str) -> FloatArray:  # noq
         given = np.asarray(value)
         numbers = given.astype(float) if given.dtype.kind in "biufO" else None
     except Exception as cause:
-        msg = f"{parameter} must be {meaning}, not {shown(value)}: {cause}."
+        msg = f"{parameter} must be {meaning}, not {shown(value)}: {str(cause).rstrip('.')}."
         raise ParameterError(msg, parameter=parameter, value=value) from cause
     if numbers is None or (given.dtype == object and any(_is_no_number(entry) for entry in given.flat)):
         msg = f"{parameter} must be {meaning}, not {shown(value)}."

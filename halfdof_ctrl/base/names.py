@@ -13,7 +13,7 @@ from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 
-from halfdof_ctrl.base.doors import shown, wrong_object
+from halfdof_ctrl.base.doors import described, shown, wrong_object
 from halfdof_ctrl.base.errors import SignalNameError
 from halfdof_ctrl.base.near_names import nearest_names
 
@@ -289,7 +289,7 @@ def _no_names_error(given: object, what: str) -> SignalNameError:
     order = ", whose order changes from run to run" if isinstance(given, set | frozenset) else ""
     example = f"[{given}]" if number and abs(int(given)) <= LARGEST_NUMBER else "['a', 'b']"  # type: ignore[call-overload]
     msg = (
-        f"Names{f' of {what}' if what else ''} must be a text or a list of texts, not a {type(given).__name__}{order}. "
+        f"Names{f' of {what}' if what else ''} must be a text or a list of texts, not {described(given)}{order}. "
         f"Give a list, such as {example}."
     )
     return SignalNameError(msg, names=())

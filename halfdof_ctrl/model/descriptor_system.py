@@ -10,13 +10,12 @@ The reduction, the checks and the plots are those of mechanical models; words ar
 from dataclasses import dataclass, fields
 from typing import Any
 
-import numpy as np
-
 from halfdof_ctrl.base.arrays import (
     Matrix,
     checked_matrix,
     checked_square_matrices,
     is_zero_number,
+    shape_of,
     unit_matrix,
 )
 from halfdof_ctrl.base.errors import MatrixError
@@ -153,12 +152,7 @@ def _checked(value: object, letter: str, shape: tuple[int, int], *, sparse: bool
 
 def _count(value: Any, n: int, axis: int) -> int:  # noqa: ANN401  # whatever the user gave
     """Count the inputs or outputs, one for a list of n numbers."""
-    try:
-        shape = np.shape(value) if not hasattr(value, "shape") else value.shape
-    except (TypeError, ValueError):  # ragged: left to the check of the matrix itself
-        return 1
-    if not isinstance(shape, tuple):
-        return 1
+    shape = shape_of(value)
     return 1 if len(shape) == 1 and shape[0] == n else int(shape[axis]) if len(shape) > axis else 1
 
 

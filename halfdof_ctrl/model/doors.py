@@ -1,5 +1,7 @@
 """The door for models: what is no model of `mechss` is refused by name, with what to pass instead."""
 
+import os
+
 from halfdof_ctrl.base.doors import wrong_object
 from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -46,6 +48,20 @@ def checked_model(value: object, function: str, *, parameter: str = "model") -> 
         return value
     remedy = REMEDIES.get(type(value).__name__, PLAIN_REMEDY)
     raise wrong_object(function, "a model of mechss", value, remedy, parameter=parameter)
+
+
+def require_matrix(value: object, function: str, *, parameter: str) -> None:
+    """Refuse what is neither a model nor a matrix where either may stand, such as a state space or a path.
+
+    Raises
+    ------
+    WrongObjectError
+        It is one of these.
+    """
+    is_path = isinstance(value, str | os.PathLike)
+    if is_path or type(value).__name__ in REMEDIES:
+        remedy = "Load a file by hd.load_model(path)." if is_path else REMEDIES[type(value).__name__]
+        raise wrong_object(function, "a model of mechss, or matrices", value, remedy, parameter=parameter)
 
 
 def checked_nonlinear(value: object, function: str) -> NonlinearModel:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
 
-from halfdof_ctrl.base.doors import items_of, shown
+from halfdof_ctrl.base.doors import items_of, require_mapping, shown
 from halfdof_ctrl.base.errors import AssemblyError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, as_tuple, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -125,6 +125,8 @@ def _with_joined_models(
 ) -> tuple[dict[str, SecondOrderModel], list[AnyJoint]]:
     """Make every joint with a model a part with two ties."""
     found: list[AnyJoint] = []
+    if isinstance(parts, Mapping):
+        require_mapping(parts, "parts", "from names to models")
     every = dict(parts) if isinstance(parts, Mapping) else parts  # `points_of` refuses what are no parts
     number = 0
     for joint in (

@@ -24,6 +24,7 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.base.names import Names, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
 from halfdof_ctrl.model.descriptor_system import dss
+from halfdof_ctrl.model.doors import require_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -96,6 +97,7 @@ def dss2ss(
             raise SignalNameError(msg, names=())
         system: SecondOrderModel = A
     else:
+        require_matrix(A, "dss2ss", parameter="A")
         if B is None or C is None:
             msg = "dss2ss takes a system made by dss, or the matrices A, B, C, D, E."
             raise ParameterError(msg, parameter="B" if B is None else "C", value=None)

@@ -6,7 +6,9 @@ from halfdof_ctrl.base.doors import wrong_object
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
-def checked_system(value: object, function: str, *, parameter: str = "sys") -> control.StateSpace:
+def checked_system(
+    value: object, function: str, *, parameter: str = "sys", wanted: str = "a control.StateSpace"
+) -> control.StateSpace:
     """Return a state space of python-control, or refuse what is none.
 
     Raises
@@ -19,7 +21,7 @@ def checked_system(value: object, function: str, *, parameter: str = "sys") -> c
     remedy = "Convert it by control.ss." if isinstance(value, control.TransferFunction) else ""
     if isinstance(value, SecondOrderModel):
         remedy = "Convert the model by hd.mech2ss."
-    raise wrong_object(function, "a control.StateSpace", value, remedy, parameter=parameter)
+    raise wrong_object(function, wanted, value, remedy, parameter=parameter)
 
 
 def checked_time_response(value: object, function: str) -> control.TimeResponseData:

@@ -40,6 +40,7 @@ from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
 
+SYSTEM_OR_MODEL = "a model of mechss or a control.StateSpace"  #: what a frequency response is of
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
@@ -150,7 +151,7 @@ def frequency_response(
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
     else:
-        sys = checked_system(sysdata, "frequency_response", parameter="sysdata")
+        sys = checked_system(sysdata, "frequency_response", parameter="sysdata", wanted=SYSTEM_OR_MODEL)
     if omega is None:
         form = None if model is None else working_form(model, sys.nstates)
         omega = system_frequencies(sys if form is None else energy_state_space(form), model)

@@ -16,6 +16,7 @@ from halfdof_ctrl.base.arrays import FloatArray, checked_matrix, read_only
 from halfdof_ctrl.base.doors import is_choice, real_numbers, shown
 from halfdof_ctrl.base.errors import EnergyFormError, InconsistentStateError, MatrixError, ParameterError
 from halfdof_ctrl.base.names import motion_names
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form, motion_output
@@ -189,7 +190,7 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
     (('strain_y', 'momentum_y'), [3.0, 0.0], 4.5)
     """
     require_kind(states)
-    reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
+    reduction = model if isinstance(model, ExactReduction) else exact_reduction(checked_model(model, "state_map"))
     if states in ("dofs", "scaled"):
         return _map_of_dofs(reduction, states)
     form = energy_form(reduction.model)

@@ -22,6 +22,7 @@ from halfdof_ctrl.base.errors import (
 )
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
+from halfdof_ctrl.model.doors import require_matrix
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
@@ -119,6 +120,7 @@ def mech2ss(
             raise SignalNameError(msg, names=())
         reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
     else:
+        require_matrix(model, "mech2ss", parameter="model")
         reduction = exact_reduction(
             mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
         )

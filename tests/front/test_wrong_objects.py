@@ -113,7 +113,7 @@ def test_node_numbers_are_names_and_a_set_is_none() -> None:
     assert hd.mechss(np.eye(2), None, np.eye(2), dofs=numbers).dofs == ("101", "102")
     with pytest.raises(hd.HalfdofError, match="order changes from run to run"):
         hd.mechss(np.eye(2), None, np.eye(2), dofs=unordered)
-    with pytest.raises(hd.HalfdofError, match="list of texts, not a int"):
+    with pytest.raises(hd.HalfdofError, match="list of texts, not the number 5"):
         hd.mechss(np.eye(1), None, np.eye(1), dofs=single)
 
 

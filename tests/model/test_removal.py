@@ -75,7 +75,7 @@ REFUSALS: list[tuple[SecondOrderModel, object, str]] = [
     (hydromount().select("F_y", "y1"), "y", "Without y no input is left: F_y acts on nothing else"),
     (hydromount().select("F_y", "y1_dot"), "y1", "Without y1 no output is left: y1_dot shows nothing else"),
     (hydromount().prescribe_motion("y", "velocity"), "y", "The motion of y is prescribed"),
-    (hydromount(), 5, r"not a int.* Give a list, such as \[5\]"),
+    (hydromount(), 5, r"not the number 5.* Give a list, such as \[5\]"),
 ]
 
 

@@ -19,6 +19,8 @@ from halfdof_ctrl.parts.joints import AnyJoint
 BY_HAND = 1e-14  # the same sums in another order
 SOLVED = 1e-10  # two formulations of one model, each by a solve
 S = 2j * np.pi * np.geomspace(0.1, 100, 15)
+#: [m] an arm whose square is a number that can be computed with, or none
+LEVER = st.floats(-1, 1).map(lambda arm: arm if abs(arm) > 1e-30 else 0.0)
 
 
 def quarter_car() -> hd.SecondOrderModel:
@@ -51,7 +53,7 @@ def test_quarter_car_is_the_one_written_by_hand() -> None:
 
 
 @given(
-    places=st.lists(st.tuples(*[st.floats(-1, 1)] * 3), min_size=1, max_size=4),
+    places=st.lists(st.tuples(*[LEVER] * 3), min_size=1, max_size=4),
     k=st.tuples(*[st.floats(1e3, 1e5)] * 3),
 )
 def test_body_on_mounts_is_the_sum_over_lever_arms(places: list[tuple[float, ...]], k: tuple[float, ...]) -> None:
