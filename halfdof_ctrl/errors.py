@@ -34,6 +34,7 @@ from halfdof_ctrl.base.errors import (
     UncertainRankError,
     WeightError,
     WorkerError,
+    WrongObjectError,
 )
 
 __all__ = [
@@ -70,6 +71,7 @@ __all__ = [
     "UncertainRankError",
     "WeightError",
     "WorkerError",
+    "WrongObjectError",
 ]
 
 for _name in __all__:
