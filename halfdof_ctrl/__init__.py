@@ -46,7 +46,8 @@ from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_mod
 from halfdof_ctrl.report import write_report
 from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
 from halfdof_ctrl.sweeps.sweep import sweep
-from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.systems.check_result import CrossCheck
+from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.descriptor_systems import dss2ss
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
 from halfdof_ctrl.systems.state_map import StateMap, state_map

@@ -35,7 +35,8 @@ from halfdof_ctrl.page import PAGE_MARK, Findings, PageFigure, page
 from halfdof_ctrl.plots import bode_plot, pole_map_plot, step_plot
 from halfdof_ctrl.plots.figure_files import close_figure, save_figure
 from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.systems.crosscheck import CrossCheck, crosscheck
+from halfdof_ctrl.systems.check_result import CrossCheck
+from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import EigenvalueTable, eigenvalue_table
 from halfdof_ctrl.systems.frequency import descriptor_modes
 from halfdof_ctrl.systems.state_space import mech2ss

@@ -93,13 +93,35 @@ def descriptor_step_response(model: SecondOrderModel, plan: Sequence[Segment]) -
     A = np.block([[zero, unit], [-model.K, -model.C]])
     b = np.vstack([np.zeros_like(model.B), model.B])
     at_end, of_slope = np.hstack([model.F, model.G]), np.hstack([np.zeros_like(model.H), model.H])
-    outputs = np.empty((*model.D.shape, sum(segment.steps for segment in plan)))
+    return _step_response(E, A, b, (at_end, of_slope, model.D), plan)
+
+
+def system_step_response(
+    A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, plan: Sequence[Segment]
+) -> FloatArray:
+    """Integrate a state space from rest under a unit step of each input, (p, m, k), by the same steps."""
+    return _step_response(np.eye(len(A)), A, B, (C, np.zeros_like(C), D), plan)
+
+
+def _step_response(
+    E: FloatArray,
+    A: FloatArray,
+    b: FloatArray,
+    output: tuple[FloatArray, FloatArray, FloatArray],
+    plan: Sequence[Segment],
+) -> FloatArray:
+    """Integrate ``E x' = A x + b`` from zero, for the outputs of x, of x' and of the inputs."""
+    at_end, of_slope, direct = output
+    outputs = np.empty((*direct.shape, sum(segment.steps for segment in plan)))
+    if not A.size:
+        outputs[:] = direct[:, :, None]
+        return outputs
     x, done = np.zeros_like(b), 0
     for segment in plan:
         step = RadauStep.factorized(E, A, segment.h)
-        from_x, slope_from_x = step.advance(np.eye(2 * n), np.zeros((2 * n, 1)))  # a step is affine in x
+        from_x, slope_from_x = step.advance(np.eye(len(A)), np.zeros((len(A), 1)))  # a step is affine in x
         from_b, slope_from_b = step.advance(np.zeros_like(b), b)
-        before, constant = of_slope @ slope_from_x, of_slope @ slope_from_b + model.D
+        before, constant = of_slope @ slope_from_x, of_slope @ slope_from_b + direct
         for k in range(done, done + segment.steps):
             outputs[:, :, k] = before @ x + constant
             x = from_x @ x + from_b

@@ -3,28 +3,28 @@
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.spectrum import eigenvalues_and_rounding
+from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.systems.refined_poles import RefinedPoles
 
 SMALL_EIGENVALUE = 1e-6  #: of the largest or the typical frequency: eigenvalues below may stand for one at the origin
 EIGENVALUE_AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
+FEWEST_ON_GRID = 15  #: of these in the largest models
 MOST_POLE_POINTS = 100  #: poles that get a point of their own
 OFF_AXIS = (1.0 + 0.0j, 1.0 + 1.0j)  #: directions of the points off the axis, in units of a pole's size
 
 
-def moving_eigenvalues(finite: ComplexArray, A: FloatArray, gamma: float) -> ComplexArray:
+def moving_eigenvalues(finite: ComplexArray, poles: RefinedPoles, gamma: float) -> ComplexArray:
     """Leave out eigenvalues at the origin, which QZ finds at the square root of rounding where they are double.
 
     One counts as at the origin if it is small and its nearest pole of the state space is zero to what A tells.
     Where none is left, the model's typical frequency stands for the time scale.
     """
-    poles, rounding = eigenvalues_and_rounding(A)
     away = finite[np.abs(finite) > EIGENVALUE_AT_ORIGIN * gamma]
-    if poles.size and away.size:
-        nearest = np.abs(away[:, None] - poles).argmin(axis=1)
-        away = away[~(_is_small(away, gamma) & (np.abs(poles) <= rounding)[nearest])]
+    if poles.values.size and away.size:
+        nearest = np.abs(away[:, None] - poles.values).argmin(axis=1)
+        away = away[~(_is_small(away, gamma) & poles.at_origin[nearest])]
     return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
 
 
@@ -33,11 +33,13 @@ def _is_small(eigenvalues: ComplexArray, gamma: float) -> npt.NDArray[np.bool_]:
     return np.asarray(np.abs(eigenvalues) <= SMALL_EIGENVALUE * max(np.abs(eigenvalues).max(initial=0.0), gamma))
 
 
-def check_points(moving: ComplexArray) -> ComplexArray:
-    """Choose points on the imaginary axis around and at the poles, and off the axis."""
-    chosen = moving[:: max(1, moving.size // MOST_POLE_POINTS)]
+def check_points(moving: ComplexArray, most: int) -> ComplexArray:
+    """Choose points on the imaginary axis around and at the poles, and off the axis, about as many as asked for."""
+    share = min(1.0, most / (GRID_POINTS + 2 * MOST_POLE_POINTS))
+    at_most = max(1, int(share * MOST_POLE_POINTS))
+    chosen = moving[np.unique(np.linspace(0, moving.size - 1, min(moving.size, at_most)).astype(np.intp))]
     low, high = np.abs(moving).min(), np.abs(moving).max()
-    grid = np.geomspace(low / 10.0, high * 10.0, GRID_POINTS)
+    grid = np.geomspace(low / 10.0, high * 10.0, max(FEWEST_ON_GRID, int(share * GRID_POINTS)))
     swinging = chosen[chosen.imag > 0.0]
     lift = np.maximum(0.0, CLEARANCE * np.abs(swinging) - np.abs(swinging.real))
     at_poles = lift + 1j * swinging.imag

@@ -1,51 +1,70 @@
-"""Poles of a state space beside the finite eigenvalues of a model, matched one to one."""
+"""Poles of a state space beside the finite eigenvalues of a model, matched one to one, both refined."""
 
 import numpy as np
+import scipy.linalg
 import scipy.optimize
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.spectrum import ROUNDING_OF_A, eigenvalues_and_rounding
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import ROUNDING_OF_A
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.judged import SAFETY, Grade, Judged, graded
+from halfdof_ctrl.systems.refined_poles import RefinedPoles
 
-POLE_TOLERANCE = 1e-10  #: relative to the pole, beside what rounding may move it
+POLE_TOLERANCE = 1e-10  #: relative to the eigenvalue
 PARTS_OF_THE_WAY = (0.0, 0.3, 0.7, 1.0)  #: parts of the way from an eigenvalue to its pole
 
 
-def compare_poles(model: SecondOrderModel, A: FloatArray, finite: ComplexArray, gamma: float) -> tuple[float, str]:
-    """Match the poles one to one and give the largest relative error and which pole it is.
+def compare_poles(
+    model: SecondOrderModel, poles: RefinedPoles, finite: ComplexArray, bounds: FloatArray, gamma: float
+) -> Judged:
+    """Match the poles one to one and judge the distance of each from its eigenvalue, relative to that.
 
-    A pole beside its eigenvalue is no error if P(s) is singular to within rounding of M, C, K there, at the eigenvalue
-    and on the way between: rounding splits a k-fold eigenvalue by its k-th root, in A as in M, C, K.
+    The numbers allow what rounding of A moves a pole by, and rounding of M, C, K its eigenvalue. Beyond that
+    a pole is no error if P(s) is singular to within rounding of M, C, K there, at the eigenvalue and on the way
+    between: rounding splits a k-fold eigenvalue by its k-th root, in A as in M, C, K.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    poles : RefinedPoles
+        Of the state space.
+    finite, bounds : (k,) ndarrays
+        Finite eigenvalues of the descriptor form, and how far rounding may have moved each.
+    gamma : float
+        A typical frequency [rad/s].
     """
-    if A.shape[0] != finite.size:
-        return float("inf"), f"{A.shape[0]} poles for {finite.size} finite eigenvalues"
+    if poles.values.size != finite.size:
+        words = f"{poles.values.size} poles for {finite.size} finite eigenvalues"
+        return Judged(Grade.FAILED, float("inf"), 0.0, words)
     if finite.size == 0:
-        return 0.0, "no poles"
-    poles, rounding = eigenvalues_and_rounding(A)
-    with np.errstate(invalid="ignore"):
-        distance = np.abs(poles[:, None] - finite) / (np.abs(poles)[:, None] + np.abs(finite))
-    rows, columns = scipy.optimize.linear_sum_assignment(np.nan_to_num(distance))  # 0 from 0 is no distance
-    poles, finite = poles[rows], finite[columns]
-    difference = np.abs(poles - finite)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        allowed = np.abs(finite) + (rounding[rows] + ROUNDING_OF_A * gamma) / POLE_TOLERANCE
-        errors = np.where(difference > 0.0, difference / allowed, 0.0)
-    for place in np.flatnonzero(errors > POLE_TOLERANCE).tolist():
-        excess = _excess(model, finite[place], poles[place], gamma)
-        errors[place] = min(errors[place], excess * POLE_TOLERANCE)
-    worst = int(np.argmax(errors))
-    return float(errors[worst]), f"pole {complex_in_words(poles[worst])}"
+        return Judged.nothing("no poles")
+    known = max(model.known_to / EPS, 1.0)
+    with np.errstate(all="ignore"):
+        distance = np.abs(poles.values[:, None] - finite) / (np.abs(poles.values)[:, None] + np.abs(finite))
+        rows, columns = scipy.optimize.linear_sum_assignment(np.nan_to_num(distance))  # 0 from 0 is no distance
+        found, finite = poles.values[rows], finite[columns]
+        size = np.where(np.abs(finite) > 0.0, np.abs(finite), np.abs(found))
+        size = np.where(size > 0.0, size, 1.0)
+        both_zero = poles.at_origin[rows] & (finite == 0.0)
+        errors = np.where(both_zero, 0.0, np.abs(found - finite) / size)
+        room = SAFETY * (poles.bounds[rows] + np.nan_to_num(bounds[columns], posinf=0.0) * known) / size
+    for place in np.flatnonzero(errors > POLE_TOLERANCE + room).tolist():
+        if _is_within_rounding(model, complex(finite[place]), complex(found[place]), gamma, known):
+            room[place] = errors[place]
+    grade, worst = graded(errors, room, POLE_TOLERANCE)
+    return Judged(grade, float(errors[worst]), float(room[worst]), f"pole {complex_in_words(complex(found[worst]))}")
 
 
-def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: float) -> float:
-    """Measure how far P(s) is from singular on the way from an eigenvalue to its pole, in units of rounding.
+def _is_within_rounding(
+    model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: float, known: float
+) -> bool:
+    """Return whether P(s) is singular to within rounding on the way from an eigenvalue to its pole.
 
     The unit is that of the terms of P, scaled, at s or at the typical frequency, whichever is larger: mixing the
     coordinates leaves rounding of the large terms where small ones stand alone.
     """
-    distances = []
     for part in PARTS_OF_THE_WAY:
         s = eigenvalue + part * (pole - eigenvalue)
         at = max(abs(s), gamma)
@@ -53,5 +72,6 @@ def _excess(model: SecondOrderModel, eigenvalue: complex, pole: complex, gamma: 
         rows, columns = scaling_powers(size)
         scale = rows[:, None] * columns
         smallest = scipy.linalg.svdvals((model.K + s * model.C + s**2 * model.M) * scale)[-1]
-        distances.append(smallest / scipy.linalg.svdvals(size * scale)[0])
-    return float(max(distances) / ROUNDING_OF_A)
+        if smallest > ROUNDING_OF_A * known * scipy.linalg.svdvals(size * scale)[0]:
+            return False
+    return True

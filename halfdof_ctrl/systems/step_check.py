@@ -1,0 +1,152 @@
+"""The step response of a state space against that of the descriptor form, by one integrator on both.
+
+Radau IIA takes the same steps on ``E x' = A x + b`` with the singular E of the model and with E = 1 of the state space.
+What it leaves out is then the same on both sides, and what differs are the equations. python-control's own step
+response is measured beside it and decides nothing. Errors are relative to the channel's largest value, since a response
+in time passes through zero.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import control
+import numpy as np
+
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.progress import progress
+from halfdof_ctrl.descriptor.radau import Segment, descriptor_step_response, step_plan, system_step_response
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.judged import SAFETY, Judged, graded
+from halfdof_ctrl.systems.state_space_data import StateSpaceData
+
+STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
+ROUNDINGS = 3  #: tried, of which the largest change counts: a single one may happen to change next to nothing
+ROUNDED = 16.0  #: eps, or what entries are known to: how much these change each number
+ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
+MOST_INPUTS = 8  #: for which python-control's own response is measured
+STEP_WORK = 1e5  #: steps times unknowns of one integration; the horizon ends early where they do not suffice
+FEWEST_STEPS = 100  #: of an integration
+MOST_STEPS = 1500  #: of an integration
+FEW_UNKNOWNS = 200  #: up to which steps may have any number of lengths ...
+FEW_LENGTHS = 4  #: ... and above which so many, since each takes factorizations
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class StepCheck:
+    """What a comparison of step responses says."""
+
+    judged: Judged
+    horizon: float  #: how far it was followed [s]
+    evaluation: float  #: error of python-control's own step response, relative to the channel's largest value
+    evaluation_worst: str
+
+
+def compare_steps(model: SecondOrderModel, sys: control.StateSpace, moving: ComplexArray) -> StepCheck:
+    """Follow the response to a step of each input, segment by segment.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    sys : control.StateSpace
+    moving : (k,) complex ndarray
+        Eigenvalues that are not at the origin.
+    """
+    if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
+        words = "not followed: a step has no derivative for Bv, Ba, Dv, Da"
+        return StepCheck(judged=Judged.nothing(words), horizon=0.0, evaluation=0.0, evaluation_worst="not followed")
+    unknowns = 2 * len(model.dofs) + sys.nstates
+    steps = int(np.clip(STEP_WORK / unknowns, FEWEST_STEPS, MOST_STEPS))
+    plan = step_plan(moving, steps)[: None if unknowns <= FEW_UNKNOWNS else FEW_LENGTHS]
+    data = StateSpaceData.of(sys)
+    exact, found = descriptor_step_response(model, plan), system_step_response(*data, plan)
+    time = np.cumsum(np.concatenate([np.full(segment.steps, segment.h) for segment in plan]))
+    largest = _channel_size(np.abs(exact))
+    difference = np.abs(found - exact)
+    room = np.where(difference > STEP_TOLERANCE * largest, _rounding_of_zeros(largest), 0.0)
+    if (difference > STEP_TOLERANCE * largest + room).any():
+        room = room + _allowed(model, data, plan)
+    errors, allowed = difference / largest, np.broadcast_to(room / largest, difference.shape)
+    grade, place = graded(errors, allowed, STEP_TOLERANCE)
+    evaluated = _by_control(data, plan, min(sys.ninputs, MOST_INPUTS))
+    lost = np.nan_to_num(
+        np.abs(evaluated - found[:, : evaluated.shape[1]]) / largest[:, : evaluated.shape[1]], nan=np.inf
+    )
+    i, j, k = np.unravel_index(int(lost.argmax()), lost.shape)
+    return StepCheck(
+        judged=Judged(
+            grade,
+            float(errors.ravel()[place]),
+            float(allowed.ravel()[place]),
+            _where(model, time, *np.unravel_index(place, errors.shape)),
+        ),
+        horizon=float(time[-1]),
+        evaluation=float(lost[i, j, k]),
+        evaluation_worst=_where(model, time, i, j, k),
+    )
+
+
+def _by_control(data: StateSpaceData, plan: tuple[Segment, ...], inputs: int) -> FloatArray:
+    """Follow the responses to a step of the first inputs as python-control does, (p, inputs, k)."""
+    A, B, C, D = data
+    found = np.empty((len(C), inputs, sum(segment.steps for segment in plan)))
+    for j in progress(range(inputs), "step responses"):
+        system = control.StateSpace(A, B[:, [j]], C, D[:, [j]], 0)
+        state, done = np.zeros(len(A)), 0
+        for segment in plan:
+            time = segment.h * np.arange(segment.steps + 1)
+            part = control.forced_response(
+                system, time, np.ones((1, time.size)), initial_state=state, return_states=True, squeeze=False
+            )
+            found[:, j, done : done + segment.steps] = np.asarray(part.y).reshape(len(C), time.size)[:, 1:]
+            state = np.asarray(part.x).reshape(len(A), time.size)[:, -1]
+            done += segment.steps
+    return found
+
+
+def _allowed(model: SecondOrderModel, data: StateSpaceData, plan: tuple[Segment, ...]) -> FloatArray:
+    """Return what rounding every number once more, at random, changes in the largest value of each channel, (p, m, 1).
+
+    Above index one an integration multiplies it by powers of 1 / h.
+    """
+    exact, found = descriptor_step_response(model, plan), system_step_response(*data, plan)
+    moved = np.zeros((*exact.shape[:2], 1))
+    for seed in range(ROUNDINGS):
+        other = descriptor_step_response(_rounded(model, seed), plan)
+        generator = np.random.default_rng(seed)
+        another = system_step_response(*[part * (1.0 + _shares(generator, part.shape, EPS)) for part in data], plan)
+        change = np.abs(other - exact).max(axis=2) + np.abs(another - found).max(axis=2)
+        moved = np.maximum(moved, change[:, :, None])
+    return np.asarray(SAFETY * moved)
+
+
+def _rounded(model: SecondOrderModel, seed: int) -> SecondOrderModel:
+    """Round every entry of a model once more, at random."""
+    generator = np.random.default_rng(seed)
+    rounded: dict[str, Any] = {}
+    for letter in ("M", "C", "K", "B", "F", "G", "H", "D"):
+        entries = getattr(model, letter)
+        known = model.known_to if letter in {"M", "C", "K"} else EPS
+        rounded[letter] = read_only(entries * (1.0 + _shares(generator, entries.shape, known)))
+    return replace(model, **rounded)
+
+
+def _shares(generator: np.random.Generator, shape: tuple[int, ...], known: float) -> FloatArray:
+    return ROUNDED * known * generator.uniform(-1.0, 1.0, shape)
+
+
+def _channel_size(size: FloatArray) -> FloatArray:
+    """Return the largest value of each channel (p, m, 1); of the whole response where a channel is zero."""
+    largest = size.max(axis=2, keepdims=True)
+    overall = size.max(initial=0.0)
+    return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
+
+
+def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
+    """Return what rounding leaves of a channel that is zero, by the sizes of its output and its input (p, m, 1)."""
+    by_output = largest.max(axis=1, keepdims=True)
+    by_input = (largest / by_output).max(axis=0, keepdims=True)
+    return np.asarray(ROUNDING_OF_ZERO * by_output * by_input)
+
+
+def _where(model: SecondOrderModel, time: FloatArray, i: Any, j: Any, k: Any) -> str:  # noqa: ANN401  # integers of numpy
+    return f"{model.outputs[int(i)]} from {model.inputs[int(j)]} at t = {time[int(k)]:.4g} s"
