@@ -19,6 +19,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of
 from halfdof_ctrl.base.double_double import BITS, SPLITTER
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
+SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
 
@@ -139,6 +140,11 @@ class _Complex:
             _added(_scaled(self.real, real), _scaled(self.imag, -imag)),
             _added(_scaled(self.real, imag), _scaled(self.imag, real)),
         )
+
+
+def as_it_is(matrix: FloatArray) -> Matrix:
+    """Return a dense matrix with few entries as a sparse one, whose residuals take less time."""
+    return csc_array(matrix) if np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size else matrix
 
 
 def two_sum(a: FloatArray, b: FloatArray) -> Pair:

@@ -21,7 +21,7 @@ from halfdof_ctrl.descriptor.contours import contour
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
 from halfdof_ctrl.descriptor.groups import Listed, separated
 from halfdof_ctrl.descriptor.patterns import diagonal_blocks
-from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
+from halfdof_ctrl.descriptor.quotients import KNOWN, Estimates, eigenvalue_estimates
 from halfdof_ctrl.descriptor.residues import PRIMES
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 from halfdof_ctrl.descriptor.unit_ranges import over_more_decades
@@ -50,6 +50,7 @@ class FiniteSpectrum:
     bounds: FloatArray  #: (k,) of the error of each [rad/s]
     most: int  #: what the stored numbers say exactly; k where nothing is in doubt
     doubts: tuple[str, ...]  #: what is uncertain, in words
+    close: int = 0  #: how many of the largest rest on parts that stand little above rounding
 
 
 @dataclass(slots=True)
@@ -60,6 +61,7 @@ class _Findings:
     zeros: int = 0
     radius: float = 0.0  #: zeros are known to this
     doubts: list[str] = field(default_factory=list)
+    close: int = 0
 
 
 def finite_spectrum(
@@ -78,7 +80,7 @@ def finite_spectrum(
     """
     blocks = diagonal_blocks(np.any([part != 0.0 for part in coefficients], axis=0))
     values, bounds, doubts = [np.zeros(0, dtype=np.complex128)], [np.zeros(0)], []
-    most = 0
+    most = close = 0
     for rows, columns in blocks:
         parts = [part[np.ix_(rows, columns)] for part in coefficients]
         if counts is not None and len(blocks) == 1:
@@ -92,7 +94,10 @@ def finite_spectrum(
         bounds += [_zero_bounds(found, of_block.at_origin) * polynomial.unit, found.listed.bounds * polynomial.unit]
         doubts += found.doubts
         most += of_block.degree
-    return FiniteSpectrum(values=np.concatenate(values), bounds=np.concatenate(bounds), most=most, doubts=tuple(doubts))
+        close += found.close
+    return FiniteSpectrum(
+        values=np.concatenate(values), bounds=np.concatenate(bounds), most=most, doubts=tuple(doubts), close=close
+    )
 
 
 def _zero_bounds(found: _Findings, exact: int) -> FloatArray:
@@ -124,6 +129,7 @@ def _of_block(polynomial: ScaledPolynomial, counts: ExactCounts) -> _Findings:
     others = estimates.values[~known & ~near]
     found.listed = separated(polynomial, estimates, known, others, has_zeros=found.zeros > 0)
     _count_missing_zeros(polynomial, found, counts)
+    _doubt_far_ones(polynomial, found)
     _judge(polynomial, found, counts)
     return found
 
@@ -136,6 +142,30 @@ def _count_missing_zeros(polynomial: ScaledPolynomial, found: _Findings, counts:
     around, below = (contour(polynomial, 0.0, radius).count for radius in (OUTSIDE * size.max(), size.min() / OUTSIDE))
     if around is not None and below is not None and around == below + size.size and below > found.zeros:
         found.zeros, found.radius = below, max(found.radius, float(np.sqrt(TINY) * size.min()))
+
+
+def _doubt_far_ones(polynomial: ScaledPolynomial, found: _Findings) -> None:
+    """Leave out eigenvalues far above all others that rounding moves by their size, and doubt those it moves much.
+
+    They stand for infinite ones if a part of M, C, K that is no more than rounding is taken for one: a decision that a
+    method with ranks may take otherwise.
+    """
+    values, bounds = found.listed.values, found.listed.bounds
+    size = np.abs(values)
+    clear = bounds <= FAINT * size
+    far = ~clear & (size > FAR * size[clear].max(initial=0.0))
+    lost = far & ~(bounds <= (KNOWN if clear.any() else 1.0) * size)
+    far &= clear.any()
+    close = far & ~lost
+    found.listed = Listed(values[~lost], bounds[~lost], found.listed.doubts)
+    found.close = int(np.count_nonzero(close))
+    if found.close:
+        above = float((size[close] / bounds[close]).min())
+        found.doubts.append(
+            f"{found.close} of the eigenvalues, from {size[close].min() * polynomial.unit:.3g} rad/s on, "
+            f"{'rests' if found.close == 1 else 'rest'} on a part of M, C, K that stands {above:.1g} times above "
+            f"rounding: if that part is meant as zero, {'it is' if found.close == 1 else 'they are'} at infinity"
+        )
 
 
 def _first(weights: npt.NDArray[np.int64], count: int) -> npt.NDArray[np.bool_]:

@@ -24,6 +24,7 @@ class FoundStructure:
     most_index: int  #: the larger of the index of the stored numbers and that by ranks up to rounding
     is_regular: bool
     doubts: tuple[str, ...]
+    close: int = 0  #: how many of the largest values rest on parts that stand little above rounding
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
@@ -58,6 +59,7 @@ def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
         most_index=most_index,
         is_regular=True,
         doubts=tuple(doubts),
+        close=spectrum.close,
     )
 
 

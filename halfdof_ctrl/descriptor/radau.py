@@ -20,9 +20,12 @@ import scipy.linalg
 import scipy.special
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
+from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 STAGES = 5
+REFINEMENTS = 2  #: of a solution, by residuals in twice the working precision: rounding of M is no state
 RESOLUTION = 0.25  #: step length times the size of the fastest eigenvalue that still moves
 GONE = 33.0  #: time constants after which a mode is below rounding, exp(-33) = 5e-15
 GROWN = 5.0  #: time constants for which a growing mode is followed, which multiplies rounding by exp(5) = 150
@@ -137,14 +140,18 @@ class RadauStep:
     h: float  #: step [s]
     A: FloatArray
     rows: FloatArray  #: (n, 1) powers of two that scale the rows to even sizes
-    factors: tuple[tuple[DenseMatrix, DenseMatrix], ...]  #: LU for each eigenvalue of `_upper_half`
+    columns: FloatArray  #: (n, 1) and the columns, whatever the units of the unknowns are
+    factors: tuple[tuple[DenseMatrix, DenseMatrix], ...]  #: LU for each eigenvalue of `_modes`
+    exact: ExactPolynomial  #: ``E - s A``, rows and columns scaled
 
     @classmethod
     def factorized(cls, E: FloatArray, A: FloatArray, h: float) -> "RadauStep":
         """Factorize for steps of length h."""
-        rows = np.ldexp(1.0, -np.frexp((np.abs(E) + h * np.abs(A)).max(axis=1, keepdims=True))[1])
-        factors = [scipy.linalg.lu_factor(rows * (E - h * mode.eigenvalue * A)) for mode in _modes()]
-        return cls(h, A, rows, tuple(factors))
+        down, across = scaling_powers(np.abs(E) + h * np.abs(A))
+        rows, columns = down[:, None], across[:, None]
+        even = [rows * E * columns.T, -rows * A * columns.T]
+        factors = [scipy.linalg.lu_factor(even[0] + h * mode.eigenvalue * even[1]) for mode in _modes()]
+        return cls(h, A, rows, columns, tuple(factors), ExactPolynomial([as_it_is(part) for part in even]))
 
     def advance(self, x: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the states (n, k) one step later, and their slopes there."""
@@ -152,6 +159,9 @@ class RadauStep:
         change, slope = np.zeros_like(x), np.zeros_like(x)
         for mode, factor in zip(_modes(), self.factors, strict=True):
             part = scipy.linalg.lu_solve(factor, right)
+            for _ in range(REFINEMENTS):
+                part += scipy.linalg.lu_solve(factor, self.exact.residual(self.h * mode.eigenvalue, part, right))
+            part *= self.columns
             change += (mode.to_change * part).real
             slope += (mode.to_slope * part).real
         return x + self.h * change, slope

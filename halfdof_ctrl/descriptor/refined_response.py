@@ -13,16 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg.lapack import zgetrf, zgetrs
-from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray, Matrix, powers_of_two
-from halfdof_ctrl.base.exact_products import ExactPolynomial
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray, powers_of_two
+from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import REFINED_ENOUGH
 
 FACTORS_HELD = 2**20  #: complex entries of factors held at a time (16 MB)
 MOST_ROUNDS = 4  #: of refinement; two are enough but where P(s) is nearly singular
-SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +107,7 @@ class _Evaluator:
         self, P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, exact_powers: tuple[int, ...]
     ) -> None:
         self.P, self.B, self.F, self.D = P, B, F, D
-        self.exact = ExactPolynomial([_as_it_is(part) for part in P])
+        self.exact = ExactPolynomial([as_it_is(part) for part in P])
         self.sizes = [np.abs(part) if k not in exact_powers and part.any() else None for k, part in enumerate(P)]
 
     def into(self, found: RefinedResponse, points: ComplexArray, places: list[int]) -> None:
@@ -214,8 +212,3 @@ def _slope(coefficients: Coefficients, s: complex) -> DenseMatrix:
         if part.any():
             value = value + power * s ** (power - 1) * part
     return value
-
-
-def _as_it_is(matrix: DenseMatrix) -> Matrix:
-    """Return a matrix with few entries as a sparse one, which residuals take less time with."""
-    return csc_array(matrix) if np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size else matrix

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
 from halfdof_ctrl.base.spectrum import order_by_size
 from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
@@ -26,6 +27,7 @@ class PencilStructure:
     bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
     most_index: int  #: the index, or a larger one that the ranks up to rounding have
     most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
+    fewest_finite: int  #: k, without those that rest on parts which stand little above rounding
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
     is_regular: bool  #: whether det P(s) is not identically zero, exactly
@@ -81,6 +83,11 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
         With a singular pencil (`is_regular` False) the finite eigenvalues are those of its regular part, and
         the other figures mean nothing.
 
+    Warns
+    -----
+    CloseDecisionWarning
+        Eigenvalues far above all others rest on a part of M, C, K that stands little above rounding.
+
     Notes
     -----
     Counts are those of the stored numbers, exactly (`exact_counts`); eigenvalues are those of QZ made sharper, each
@@ -121,11 +128,16 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     )
     found = found_structure(model.quadratics.P)
     order = order_by_size(found.values)
+    if found.close:
+        of_count = next(doubt for doubt in found.doubts if "above rounding" in doubt)
+        msg = f"The number of finite eigenvalues, {found.values.size}, is a close decision: {of_count}."
+        give_warning(msg, CloseDecisionWarning)
     return PencilStructure(
         finite_eigenvalues=read_only(found.values[order]),
         bounds=read_only(found.bounds[order]),
         most_index=found.most_index,
         most_finite=found.most,
+        fewest_finite=found.values.size - found.close,
         n_infinite=2 * len(model.dofs) - found.values.size,
         infinite_blocks=found.blocks,
         is_regular=found.is_regular,

@@ -103,16 +103,17 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
 def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     """Compare all that can be."""
     structure = pencil_structure(model)
-    finite, poles = structure.finite_eigenvalues, refined_poles(np.asarray(sys.A, dtype=float))
-    gamma = typical_frequency(model)
+    told = slice(None if sys.nstates >= structure.finite_eigenvalues.size else structure.fewest_finite)
+    finite, bounds = structure.finite_eigenvalues[told], structure.bounds[told]
+    poles, gamma = refined_poles(np.asarray(sys.A, dtype=float)), typical_frequency(model)
     moving = moving_eigenvalues(finite, poles, gamma)
     points = check_points(moving, _most_points(model, sys))
     transfer = compare_transfer(model, sys, points)
-    of_poles = compare_poles(model, poles, finite, structure.bounds, gamma)
-    steps = compare_steps(model, sys, moving)
+    of_poles = compare_poles(model, poles, finite, bounds, gamma, most=structure.most_finite)
+    steps = compare_steps(model, sys, moving, transfer.zero_scale)
     return CrossCheck(
         order=sys.nstates,
-        n_finite=finite.size,
+        n_finite=structure.finite_eigenvalues.size,
         n_infinite=structure.n_infinite,
         count_grade=_count_grade(sys.nstates, structure),
         max_transfer_error=transfer.judged.error,
@@ -146,8 +147,7 @@ def _count_grade(order: int, structure: PencilStructure) -> int:
     """Grade the number of states: the stored numbers may have more than what is told from rounding."""
     if order == structure.finite_eigenvalues.size:
         return int(Grade.OK)
-    least = structure.finite_eigenvalues.size
-    return int(Grade.WITHIN if least <= order <= structure.most_finite else Grade.FAILED)
+    return int(Grade.WITHIN if structure.fewest_finite <= order <= structure.most_finite else Grade.FAILED)
 
 
 def _most_points(model: SecondOrderModel, sys: control.StateSpace) -> int:

@@ -17,9 +17,17 @@ PARTS_OF_THE_WAY = (0.0, 0.3, 0.7, 1.0)  #: parts of the way from an eigenvalue 
 
 
 def compare_poles(
-    model: SecondOrderModel, poles: RefinedPoles, finite: ComplexArray, bounds: FloatArray, gamma: float
+    model: SecondOrderModel,
+    poles: RefinedPoles,
+    finite: ComplexArray,
+    bounds: FloatArray,
+    gamma: float,
+    *,
+    most: int | None = None,
 ) -> Judged:
     """Match the poles one to one and judge the distance of each from its eigenvalue, relative to that.
+
+    Of eigenvalues that are not told from zero it is relative to the smallest one that is.
 
     The numbers allow what rounding of A moves a pole by, and rounding of M, C, K its eigenvalue. Beyond that
     a pole is no error if P(s) is singular to within rounding of M, C, K there, at the eigenvalue and on the way
@@ -34,22 +42,27 @@ def compare_poles(
         Finite eigenvalues of the descriptor form, and how far rounding may have moved each.
     gamma : float
         A typical frequency [rad/s].
+    most : int, optional
+        Finite eigenvalues that the stored numbers have, where those that are told from rounding are fewer: so many
+        poles may be matched by none.
     """
-    if poles.values.size != finite.size:
+    if not finite.size <= poles.values.size <= max(finite.size, most or 0):
         words = f"{poles.values.size} poles for {finite.size} finite eigenvalues"
         return Judged(Grade.FAILED, float("inf"), 0.0, words)
-    if finite.size == 0:
+    if 0 in (finite.size, poles.values.size):
         return Judged.nothing("no poles")
     known = max(model.known_to / EPS, 1.0)
     with np.errstate(all="ignore"):
         distance = np.abs(poles.values[:, None] - finite) / (np.abs(poles.values)[:, None] + np.abs(finite))
         rows, columns = scipy.optimize.linear_sum_assignment(np.nan_to_num(distance))  # 0 from 0 is no distance
         found, finite = poles.values[rows], finite[columns]
-        size = np.where(np.abs(finite) > 0.0, np.abs(finite), np.abs(found))
-        size = np.where(size > 0.0, size, 1.0)
-        both_zero = poles.at_origin[rows] & (finite == 0.0)
+        doubt = np.nan_to_num(bounds[columns], posinf=0.0) * known
+        away = np.abs(finite) > SAFETY * doubt
+        moving = np.abs(finite)[away].min(initial=np.inf)
+        size = np.where(away, np.abs(finite), moving if np.isfinite(moving) else gamma)
+        both_zero = poles.at_origin[rows] & ~away
         errors = np.where(both_zero, 0.0, np.abs(found - finite) / size)
-        room = SAFETY * (poles.bounds[rows] + np.nan_to_num(bounds[columns], posinf=0.0) * known) / size
+        room = SAFETY * (poles.bounds[rows] + doubt) / size
     for place in np.flatnonzero(errors > POLE_TOLERANCE + room).tolist():
         if _is_within_rounding(model, complex(finite[place]), complex(found[place]), gamma, known):
             room[place] = errors[place]

@@ -56,7 +56,10 @@ def refined_poles(A: FloatArray) -> RefinedPoles:
         steps, fine = _first_order(matrix, exact, values, right, left)
         gaps = _gaps(values)
         isolated = np.abs(steps) <= ISOLATED * gaps
-        found, bounds = np.where(isolated, values + steps, values), np.where(isolated, fine, np.minimum(coarse, SPLIT * size))
+        found, bounds = (
+            np.where(isolated, values + steps, values),
+            np.where(isolated, fine, np.minimum(coarse, SPLIT * size)),
+        )
         left_over = np.abs(steps) ** 2 / gaps / np.abs(values)
         rough = np.flatnonzero(isolated & (left_over > SETTLED) & (values.imag >= 0.0))
         for place in rough[np.argsort(left_over[rough])[::-1]][:MOST_ITERATED].tolist():

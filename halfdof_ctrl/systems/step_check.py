@@ -22,7 +22,6 @@ from halfdof_ctrl.systems.state_space_data import StateSpaceData
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
 ROUNDINGS = 3  #: tried, of which the largest change counts: a single one may happen to change next to nothing
 ROUNDED = 16.0  #: eps, or what entries are known to: how much these change each number
-ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
 MOST_INPUTS = 8  #: for which python-control's own response is measured
 STEP_WORK = 1e5  #: steps times unknowns of one integration; the horizon ends early where they do not suffice
 FEWEST_STEPS = 100  #: of an integration
@@ -41,7 +40,9 @@ class StepCheck:
     evaluation_worst: str
 
 
-def compare_steps(model: SecondOrderModel, sys: control.StateSpace, moving: ComplexArray) -> StepCheck:
+def compare_steps(
+    model: SecondOrderModel, sys: control.StateSpace, moving: ComplexArray, zero_scale: FloatArray
+) -> StepCheck:
     """Follow the response to a step of each input, segment by segment.
 
     Parameters
@@ -50,6 +51,8 @@ def compare_steps(model: SecondOrderModel, sys: control.StateSpace, moving: Comp
     sys : control.StateSpace
     moving : (k,) complex ndarray
         Eigenvalues that are not at the origin.
+    zero_scale : (p, m, 1) ndarray
+        What channels that are zero are measured by; 0 for the others.
     """
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         words = "not followed: a step has no derivative for Bv, Ba, Dv, Da"
@@ -60,11 +63,10 @@ def compare_steps(model: SecondOrderModel, sys: control.StateSpace, moving: Comp
     data = StateSpaceData.of(sys)
     exact, found = descriptor_step_response(model, plan), system_step_response(*data, plan)
     time = np.cumsum(np.concatenate([np.full(segment.steps, segment.h) for segment in plan]))
-    largest = _channel_size(np.abs(exact))
+    largest = np.where(zero_scale > 0.0, zero_scale, np.abs(exact).max(axis=2, keepdims=True))
+    largest = np.where(largest > 0.0, largest, 1.0)  # no response at all
     difference = np.abs(found - exact)
-    room = np.where(difference > STEP_TOLERANCE * largest, _rounding_of_zeros(largest), 0.0)
-    if (difference > STEP_TOLERANCE * largest + room).any():
-        room = room + _allowed(model, data, plan)
+    room = _allowed(model, data, plan) if (difference > STEP_TOLERANCE * largest).any() else np.zeros(largest.shape)
     errors, allowed = difference / largest, np.broadcast_to(room / largest, difference.shape)
     grade, place = graded(errors, allowed, STEP_TOLERANCE)
     evaluated = _by_control(data, plan, min(sys.ninputs, MOST_INPUTS))
@@ -132,20 +134,6 @@ def _rounded(model: SecondOrderModel, seed: int) -> SecondOrderModel:
 
 def _shares(generator: np.random.Generator, shape: tuple[int, ...], known: float) -> FloatArray:
     return ROUNDED * known * generator.uniform(-1.0, 1.0, shape)
-
-
-def _channel_size(size: FloatArray) -> FloatArray:
-    """Return the largest value of each channel (p, m, 1); of the whole response where a channel is zero."""
-    largest = size.max(axis=2, keepdims=True)
-    overall = size.max(initial=0.0)
-    return np.where(largest > 0.0, largest, overall if overall > 0.0 else 1.0)
-
-
-def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
-    """Return what rounding leaves of a channel that is zero, by the sizes of its output and its input (p, m, 1)."""
-    by_output = largest.max(axis=1, keepdims=True)
-    by_input = (largest / by_output).max(axis=0, keepdims=True)
-    return np.asarray(ROUNDING_OF_ZERO * by_output * by_input)
 
 
 def _where(model: SecondOrderModel, time: FloatArray, i: Any, j: Any, k: Any) -> str:  # noqa: ANN401  # integers of numpy

@@ -29,6 +29,7 @@ class TransferCheck:
     """What a comparison of transfer functions says."""
 
     judged: Judged
+    zero_scale: FloatArray  #: (p, m, 1) what a channel that is zero is measured by; 0 for the others
     pointwise: float  #: largest error relative to each value
     data: float  #: what the entries of M, C, K determine the transfer function to, the worst relative figure
     data_worst: str
@@ -54,8 +55,10 @@ def compare_transfer(model: SecondOrderModel, sys: control.StateSpace, points: C
     found = system_response(sys, points)
     known = max(model.known_to / EPS, 1.0)
     size, data = np.abs(exact.values), exact.data * known
-    scale = _scale_of_zeros(np.nan_to_num(size), np.nan_to_num(exact.natural))
-    is_zero = (~(size > data + ROUNDING_OF_ZERO * scale)).all(axis=2, keepdims=True)
+    is_zero = ~(size > SAFETY * data).any(axis=2, keepdims=True)
+    is_zero |= ~(size > ROUNDING_OF_ZERO * _by_signals(np.where(is_zero, 0.0, size))).any(axis=2, keepdims=True)
+    scale = _by_signals(np.where(is_zero, 0.0, size))
+    scale = np.where(scale > 0.0, scale, np.nan_to_num(exact.natural).max(axis=2, keepdims=True))
     value = np.where(is_zero, scale, np.maximum(size, NEARBY * exact.slope))
     value = np.where(value > 0.0, value, 1.0)  # no response at all, or none determined
     room = np.where(is_zero, ROUNDING_OF_ZERO * scale, 0.0) + SAFETY * (data + _finite(found.data))
@@ -69,6 +72,7 @@ def compare_transfer(model: SecondOrderModel, sys: control.StateSpace, points: C
         pointwise = np.where(difference > 0.0, difference / size, 0.0)
     return TransferCheck(
         judged=Judged(grade, float(errors.ravel()[place]), float(allowed.ravel()[place]), _where(model, points, place)),
+        zero_scale=np.where(is_zero, scale, 0.0),
         pointwise=float(np.where(is_zero, 0.0, pointwise).max(initial=0.0)),
         data=float(shares.max(initial=0.0)),
         data_worst=_where(model, points, int(shares.argmax())),
@@ -96,13 +100,14 @@ def _evaluation_loss(
     return float(loss.ravel()[place]), place
 
 
-def _scale_of_zeros(size: FloatArray, natural: FloatArray) -> FloatArray:
-    """Return what a channel that is zero is measured by, (p, m, 1): the sizes of its output and its input."""
-    largest = size.max(axis=2, keepdims=True)
+def _by_signals(size: FloatArray) -> FloatArray:
+    """Return the size that the outputs and the inputs of channels tell of each, (p, m, 1)."""
+    largest = np.nan_to_num(size).max(axis=2, keepdims=True)
     by_output = largest.max(axis=1, keepdims=True)
-    by_input = np.divide(largest, by_output, out=np.zeros_like(largest), where=by_output > 0.0).max(axis=0)
-    scale = by_output * by_input
-    return np.asarray(np.where(scale > 0.0, scale, natural.max(axis=2, keepdims=True)))
+    by_input = np.divide(largest, by_output, out=np.zeros_like(largest), where=by_output > 0.0).max(
+        axis=0, keepdims=True
+    )
+    return np.asarray(by_output * by_input)
 
 
 def _finite(data: FloatArray) -> FloatArray:
