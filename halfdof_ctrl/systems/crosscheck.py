@@ -69,11 +69,11 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     -----
     An error is ok up to 1e-10 of the value of the channel at that point (beside a zero, of the value at a frequency
     0.1 % away), 1e-10 of each eigenvalue, and 1e-9 of a channel's largest value in a step response. Beyond that it is
-    ok within what the numbers allow up to 16 times what rounding of them changes in first order: eps in each of A, B,
-    C, D, and in M, C, K what `SecondOrderModel.known_to` says, with x and y the solutions for input and output
-    ``eps |y| |A| |x|`` and so on, for a transfer function, and the same with eigenvectors for a pole. So a double pole,
-    a sharp resonance or a DOF that constraints hold raises no false alarm. A channel that is zero for every input is
-    measured by the sizes of its output and its input.
+    ok within what the numbers allow up to 16 sqrt(n) times what rounding of them changes in first order, n the DOFs:
+    eps in each of A, B, C, D, and in M, C, K what `SecondOrderModel.known_to` says. For a transfer function that is
+    ``eps |y| |A| |x|`` and so on, with x and y the solutions for input and output, and for a pole the same with
+    eigenvectors. So a double pole, a sharp resonance or a DOF that constraints hold raises no false alarm. A channel
+    that is zero for every input is measured by the sizes of its output and its input.
 
     Of sparse models with more than 2000 DOFs the transfer function and the poles of the state space are checked, by
     sparse factorizations, and the count and the time response are not: `limits` says so.

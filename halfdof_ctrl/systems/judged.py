@@ -11,7 +11,16 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 
-SAFETY = 16.0  #: times what a rounding of each number changes: A takes several operations an entry
+SAFETY = 16.0  #: times the root of the number of unknowns: how many roundings of each number are no fault
+
+
+def safety(unknowns: int) -> float:
+    """Return how many times what one rounding of each number changes is allowed: sums of roundings grow by the root.
+
+    >>> safety(4)
+    32.0
+    """
+    return SAFETY * max(unknowns, 1) ** 0.5
 
 
 class Grade(IntEnum):

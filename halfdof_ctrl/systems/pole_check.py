@@ -9,7 +9,7 @@ from halfdof_ctrl.base.spectrum import ROUNDING_OF_A
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.judged import SAFETY, Grade, Judged, graded
+from halfdof_ctrl.systems.judged import Grade, Judged, graded, safety
 from halfdof_ctrl.systems.refined_poles import RefinedPoles
 
 POLE_TOLERANCE = 1e-10  #: relative to the eigenvalue
@@ -51,18 +51,18 @@ def compare_poles(
         return Judged(Grade.FAILED, float("inf"), 0.0, words)
     if 0 in (finite.size, poles.values.size):
         return Judged.nothing("no poles")
-    known = max(model.known_to / EPS, 1.0)
+    known, many = max(model.known_to / EPS, 1.0), safety(len(model.dofs))
     with np.errstate(all="ignore"):
         distance = np.abs(poles.values[:, None] - finite) / (np.abs(poles.values)[:, None] + np.abs(finite))
         rows, columns = scipy.optimize.linear_sum_assignment(np.nan_to_num(distance))  # 0 from 0 is no distance
         found, finite = poles.values[rows], finite[columns]
         doubt = np.nan_to_num(bounds[columns], posinf=0.0) * known
-        away = np.abs(finite) > SAFETY * doubt
+        away = np.abs(finite) > many * doubt
         moving = np.abs(finite)[away].min(initial=np.inf)
         size = np.where(away, np.abs(finite), moving if np.isfinite(moving) else gamma)
         both_zero = poles.at_origin[rows] & ~away
         errors = np.where(both_zero, 0.0, np.abs(found - finite) / size)
-        room = SAFETY * (poles.bounds[rows] + doubt) / size
+        room = many * (poles.bounds[rows] + doubt) / size
     for place in np.flatnonzero(errors > POLE_TOLERANCE + room).tolist():
         if _is_within_rounding(model, complex(finite[place]), complex(found[place]), gamma, known):
             room[place] = errors[place]

@@ -16,7 +16,7 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.descriptor.radau import Segment, descriptor_step_response, step_plan, system_step_response
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.judged import SAFETY, Judged, graded
+from halfdof_ctrl.systems.judged import Judged, graded, safety
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
@@ -118,7 +118,7 @@ def _allowed(model: SecondOrderModel, data: StateSpaceData, plan: tuple[Segment,
         another = system_step_response(*[part * (1.0 + _shares(generator, part.shape, EPS)) for part in data], plan)
         change = np.abs(other - exact).max(axis=2) + np.abs(another - found).max(axis=2)
         moved = np.maximum(moved, change[:, :, None])
-    return np.asarray(SAFETY * moved)
+    return np.asarray(safety(len(model.dofs)) * moved)
 
 
 def _rounded(model: SecondOrderModel, seed: int) -> SecondOrderModel:

@@ -15,7 +15,7 @@ from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.refined_response import RefinedResponse, refined_response
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.judged import SAFETY, Judged, graded
+from halfdof_ctrl.systems.judged import Judged, graded, safety
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the value
@@ -53,15 +53,15 @@ def compare_transfer(model: SecondOrderModel, sys: control.StateSpace, points: C
         *model.quadratics, points, steps=lambda places: progress(places, "points", total=points.size)
     )
     found = system_response(sys, points)
-    known = max(model.known_to / EPS, 1.0)
+    known, many = max(model.known_to / EPS, 1.0), safety(len(model.dofs))
     size, data = np.abs(exact.values), exact.data * known
-    is_zero = ~(size > SAFETY * data).any(axis=2, keepdims=True)
+    is_zero = ~(size > many * data).any(axis=2, keepdims=True)
     is_zero |= ~(size > ROUNDING_OF_ZERO * _by_signals(np.where(is_zero, 0.0, size))).any(axis=2, keepdims=True)
     scale = _by_signals(np.where(is_zero, 0.0, size))
     scale = np.where(scale > 0.0, scale, np.nan_to_num(exact.natural).max(axis=2, keepdims=True))
     value = np.where(is_zero, scale, np.maximum(size, NEARBY * exact.slope))
     value = np.where(value > 0.0, value, 1.0)  # no response at all, or none determined
-    room = np.where(is_zero, ROUNDING_OF_ZERO * scale, 0.0) + SAFETY * (data + _finite(found.data))
+    room = np.where(is_zero, ROUNDING_OF_ZERO * scale, 0.0) + many * (data + _finite(found.data))
     determined = np.isfinite(exact.values)
     difference = np.where(determined, np.abs(found.values - exact.values), 0.0)
     errors, allowed = difference / value, room / value
