@@ -131,7 +131,7 @@ class _Evaluator:
         lu, pivots, info = zgetrf(matrix * columns, overwrite_a=True)
         if info != 0:
             return None
-        point = _Point(place, s, rows, columns, lu, pivots, _at(self.B, s), _at(self.F, s), np.zeros(0))
+        point = _Point(place, s, rows, columns, lu, pivots, _at(self.B, s), _at(self.F, s), matrix)
         point.x = point.solve(point.right)
         return point
 

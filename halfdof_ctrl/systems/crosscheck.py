@@ -20,9 +20,11 @@ from halfdof_ctrl.descriptor.first_order import typical_frequency
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.model.dense_copy import complex_model_error
+from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.check_points import check_points, moving_eigenvalues
 from halfdof_ctrl.systems.check_result import CrossCheck
+from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.judged import Grade
 from halfdof_ctrl.systems.pole_check import compare_poles
 from halfdof_ctrl.systems.refined_poles import refined_poles
@@ -84,6 +86,7 @@ def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
     >>> crosscheck(model, mech2ss(model)).verdict
     'ok'
     """
+    model, sys = checked_model(model, "crosscheck"), checked_system(sys, "crosscheck")
     if model.is_complex:
         raise complex_model_error(model)
     if (sys.noutputs, sys.ninputs) != model.D.shape:

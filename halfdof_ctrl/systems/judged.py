@@ -20,7 +20,7 @@ def safety(unknowns: int) -> float:
     >>> safety(4)
     32.0
     """
-    return SAFETY * max(unknowns, 1) ** 0.5
+    return float(SAFETY * np.sqrt(max(unknowns, 1)))
 
 
 class Grade(IntEnum):

@@ -99,10 +99,9 @@ def _iterate(
     factors = scipy.linalg.lu_factor(A - values[place] * np.eye(len(A)), check_finite=False)
     v, w = start, start
     for _ in range(2):
-        v = scipy.linalg.lu_solve(factors, v / np.linalg.norm(v), check_finite=False)
-        w = scipy.linalg.lu_solve(factors, w / np.linalg.norm(w), trans=2, check_finite=False)
-    v, w = v / np.linalg.norm(v), w / np.linalg.norm(w)
-    steps, data = _first_order(A, exact, values[[place]], v, w)
+        v = np.asarray(scipy.linalg.lu_solve(factors, v / np.linalg.norm(v), check_finite=False))
+        w = np.asarray(scipy.linalg.lu_solve(factors, w / np.linalg.norm(w), trans=2, check_finite=False))
+    steps, data = _first_order(A, exact, values[[place]], v / np.linalg.norm(v), w / np.linalg.norm(w))
     if np.abs(steps[0]) <= ISOLATED * gap:
         values[place] += steps[0]
         bounds[place] = data[0]

@@ -115,7 +115,8 @@ def _allowed(model: SecondOrderModel, data: StateSpaceData, plan: tuple[Segment,
     for seed in range(ROUNDINGS):
         other = descriptor_step_response(_rounded(model, seed), plan)
         generator = np.random.default_rng(seed)
-        another = system_step_response(*[part * (1.0 + _shares(generator, part.shape, EPS)) for part in data], plan)
+        A, B, C, D = (part * (1.0 + _shares(generator, part.shape, EPS)) for part in data)
+        another = system_step_response(A, B, C, D, plan)
         change = np.abs(other - exact).max(axis=2) + np.abs(another - found).max(axis=2)
         moved = np.maximum(moved, change[:, :, None])
     return np.asarray(safety(len(model.dofs)) * moved)
