@@ -50,7 +50,7 @@ from halfdof_ctrl.systems.frequency import (
     has_many_states,
     model_frequencies,
 )
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_space import mech2ss, system_of_model
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
@@ -234,7 +234,7 @@ def run_check(arguments: argparse.Namespace) -> int:
     """Run the cross-check; exit code 1 where it fails."""
     require_ending(arguments.o, (".json",))
     model = _model(arguments)
-    check = crosscheck(model, mech2ss(model))
+    check = crosscheck(model, system_of_model(model))
     if arguments.o is not None:
         with replacing(arguments.o) as stream:
             stream.write(check_as_json(check))
@@ -251,7 +251,7 @@ def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: 
         msg = f"A nonlinear model takes a step of one input; choose it by --inputs: {listed(model.inputs)}."
         raise ParameterError(msg, parameter="--inputs", value=model.inputs)
     with recording_warnings() as caught:
-        system = mech2ss(model.tangent())
+        system = system_of_model(model.tangent())
     for message, category in caught:
         if category is not LostStateWarning:  # of the tangent that only says how long to look
             give_warning(message, category)

@@ -24,7 +24,7 @@ from halfdof_ctrl.base.labelled import has_labels, without_labels
 from halfdof_ctrl.base.names import by_name, listed, motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_space import system_of_model
 
 Weights: TypeAlias = Mapping[str, float] | None
 
@@ -125,7 +125,7 @@ def physical_cost(reduction: ExactReduction, weights: PhysicalWeights, effort: W
 def _weighted_rows(reduction: ExactReduction, names: tuple[str, ...]) -> tuple[FloatArray, FloatArray]:
     """Give C and D of the named motions."""
     try:
-        system = mech2ss(replace(reduction, model=reduction.model.select(outputs=names)))
+        system = system_of_model(replace(reduction, model=reduction.model.select(outputs=names)))
     except ImproperError as cause:
         culprits = tuple(dict.fromkeys(output for _, output, _ in cause.pairs))
         msg = (

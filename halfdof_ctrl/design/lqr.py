@@ -43,7 +43,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
-from halfdof_ctrl.systems.state_space import labelled_system, mech2ss
+from halfdof_ctrl.systems.state_space import labelled_system, system_of_model
 
 UNSEEN = 1e-8  #: imaginary parts, or displacements beside velocities, below this part are not shown
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
@@ -232,7 +232,7 @@ def lqr(
     else:
         weights = checked_weights(model, list(physical.values()), energy)
         cost = physical_cost(reduction, weights, effort)
-    plant = mech2ss(reduction)
+    plant = system_of_model(reduction)
     solved = _solved(reduction, cost, weights, method)
     gain, A, B = solved.K, reduction.A, reduction.B
     closed = labelled_system(

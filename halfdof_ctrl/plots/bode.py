@@ -40,7 +40,7 @@ from halfdof_ctrl.systems.frequency import (
 )
 from halfdof_ctrl.systems.phase import response_phase
 from halfdof_ctrl.systems.sampled_phase import on_branch
-from halfdof_ctrl.systems.state_space import mech2ss
+from halfdof_ctrl.systems.state_space import system_of_model
 
 MARKS = 19  #: markers spread over the frequencies
 PEAK_MARKS = 6  #: markers on the highest peaks besides
@@ -186,7 +186,7 @@ def _curve(
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega), "descriptor form", reference
         try:
-            mech2ss(sysdata)
+            system_of_model(sysdata)
         except NoStateSpaceError as refusal:
             kind = f"descriptor form (no state space: {refusal.why})"
             return descriptor_response(sysdata, omega), kind, reference

@@ -36,7 +36,7 @@ from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.phase import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
-from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.state_space import energy_state_space, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
 
@@ -147,7 +147,7 @@ def frequency_response(
             return descriptor_response(sysdata, omega)
         try:
             reduction = exact_reduction(sysdata)
-            sys, model = mech2ss(reduction), sysdata
+            sys, model = system_of_model(reduction), sysdata
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
     else:
@@ -189,7 +189,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
     if not has_many_states(model):
         try:
             reduction = exact_reduction(model)
-            return _grid(*system_modes(mech2ss(reduction, improper="drop"), reduction.polynomial_part, model))
+            return _grid(*system_modes(system_of_model(reduction, improper="drop"), reduction.polynomial_part, model))
         except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)

@@ -31,6 +31,7 @@ from halfdof_ctrl.reduction.energy.modal import modal_form
 from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 Improper: TypeAlias = Literal["refuse", "drop"]
@@ -103,6 +104,9 @@ def mech2ss(
     -----
     CloseDecisionWarning
         In energy or modal states, K nearly leaves a motion free.
+    LostDigitsWarning
+        python-control's evaluation of this system (``sys(s)``, `control.bode_plot`) will lose more than 1e-6, since it
+        does not balance states of different sizes. Measured beside the slowest modes, for up to 1000 states.
 
     Examples
     --------
@@ -118,12 +122,19 @@ def mech2ss(
         if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
             raise SignalNameError(msg, names=())
-        reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
     else:
         require_matrix(model, "mech2ss", parameter="model")
-        reduction = exact_reduction(
-            mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
-        )
+        model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
+    system = system_of_model(model, improper=improper, states=states)
+    warn_of_evaluation(system, states)
+    return system
+
+
+def system_of_model(
+    model: SecondOrderModel | ExactReduction, *, improper: Improper = "refuse", states: States = "dofs"
+) -> control.StateSpace:
+    """Make the state space of a model as `mech2ss` does, for use inside: whoever evaluates it balances it."""
+    reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
     output = reduction.output
     if len(output.U) > 1 and improper == "refuse":
         raise _improper_error(reduction.model, output)

@@ -25,7 +25,7 @@ from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles
 from halfdof_ctrl.systems.state_map import StateMap
-from halfdof_ctrl.systems.state_space import mech2ss, system_of_map
+from halfdof_ctrl.systems.state_space import system_of_map, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.working_states import working_map
@@ -207,7 +207,7 @@ class _Plant:
     @classmethod
     def of(cls, model: SecondOrderModel) -> "_Plant":
         reduction = exact_reduction(checked_model(model, "A time response"))
-        sys = mech2ss(reduction)  # refuses what has no state space
+        sys = system_of_model(reduction)  # refuses what has no state space
         states = working_map(reduction)
         return cls(model, reduction, states, sys if states is None else system_of_map(states))
 

@@ -23,7 +23,7 @@ from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.hessenberg import bounded_response, state_space_response
 from halfdof_ctrl.systems.state_map import StateMap, map_of_form, state_map
-from halfdof_ctrl.systems.state_space import energy_state_space, mech2ss
+from halfdof_ctrl.systems.state_space import energy_state_space, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 AGREEMENT = 1e-12  #: relative difference between two evaluations up to which both are right
@@ -98,7 +98,7 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         The model has no state space (see `mech2ss`).
     """
-    sys = mech2ss(model)
+    sys = system_of_model(model)
     form = working_form(model, sys.nstates)
     return sys if form is None else energy_state_space(form)
 

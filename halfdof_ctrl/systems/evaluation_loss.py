@@ -1,0 +1,118 @@
+"""What python-control's evaluation of a state space will lose, measured before it is relied on.
+
+``sys(s)``, `control.bode_plot` and `control.frequency_response` bring A to Hessenberg form as it stands, without
+balancing. Where states are of very different sizes, as displacements and velocities of stiff structures are, that mixes
+large into small: a beam of forty elements loses a hundredth at its first resonance, though A, B, C, D hold all digits.
+There is no cheap predictor of the loss but one of its absence: by how much balancing A changes it. Where that is much,
+the evaluation is done at the frequencies where a loss shows and compared with refined solves.
+"""
+
+from dataclasses import dataclass
+
+import control
+import numpy as np
+from scipy.linalg.lapack import dgebal
+
+from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
+from halfdof_ctrl.reduction.method.loss import loss_points
+from halfdof_ctrl.systems.transfer_check import system_response
+
+WARNED = 1e-6  #: part of the value from which a loss is told
+EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of A up to which balancing changes next to nothing
+FEW_ENTRIES = 400  #: of A, up to which they are compared as plain numbers, which takes a microsecond
+UNEVEN = 5e7  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
+MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
+MANY_STATES = 200  #: from which it is measured at one frequency alone
+SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
+ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
+CURES = {
+    "dofs": 'mech2ss(model, states="scaled") (or "energy") keeps the digits, and so does',
+    "scaled": 'mech2ss(model, states="energy") keeps more digits where a model has such states, and so does',
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluationLoss:
+    """Which part of a value python-control's evaluation loses, where that is most."""
+
+    value: float
+    omega: float  #: [rad/s]
+    output: int
+    source: int
+
+
+def warn_of_evaluation(sys: control.StateSpace, states: str) -> None:
+    """Warn where python-control's evaluation of a system loses more than 1e-6.
+
+    Parameters
+    ----------
+    sys : control.StateSpace
+        As it is handed to the user.
+    states : str
+        What the states are.
+
+    Warns
+    -----
+    LostDigitsWarning
+    """
+    if is_even(sys.A):
+        return
+    loss = evaluation_loss(sys)
+    if loss is None or not loss.value > WARNED:
+        return
+    msg = (
+        f"A, B, C and D are right, but python-control's evaluation of them (sys(s), control.bode_plot, "
+        f"control.frequency_response) will lose {loss.value:.1e} of {sys.output_labels[loss.output]} from "
+        f"{sys.input_labels[loss.source]} at {loss.omega:.3g} rad/s: it does not balance states of different sizes. "
+        f"{CURES.get(states, 'The digits are kept by')} halfdof_ctrl.frequency_response."
+    )
+    give_warning(msg, LostDigitsWarning)
+
+
+def is_even(A: FloatArray) -> bool:
+    """Return whether the entries of a matrix are of so similar sizes that no evaluation needs to balance it.
+
+    Examples
+    --------
+    >>> is_even(np.array([[0.0, 1.0], [-400.0, -2.0]])), is_even(np.array([[0.0, 1.0], [-1e12, -2.0]]))
+    (True, False)
+    """
+    if A.size <= FEW_ENTRIES:
+        sizes = [abs(entry) for entry in A.ravel().tolist() if entry]
+        return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
+    entries = np.abs(A[A != 0.0])
+    return not entries.size or bool(entries.max() <= EVEN_ENTRIES * entries.min())
+
+
+def evaluation_loss(sys: control.StateSpace) -> EvaluationLoss | None:
+    """Measure what python-control's evaluation loses, at the frequencies where it shows.
+
+    None where it can lose nothing. An error is relative to the value, or to a thousandth of the channel's largest where
+    the value is smaller.
+    """
+    A = np.asarray(sys.A, dtype=float)
+    if len(A) > MOST_STATES or not _is_uneven(A):
+        return None
+    points = loss_points(A)
+    points = points[:1] if len(A) > MANY_STATES else points
+    right = system_response(sys, points)
+    found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
+    size = np.nan_to_num(np.abs(right.values))
+    seen = (size > ZERO_CHANNEL * np.nan_to_num(right.data, nan=np.inf)).any(axis=2, keepdims=True)
+    value = np.maximum(size, SHALLOW * size.max(axis=2, keepdims=True))
+    told = seen & np.isfinite(right.values) & (value > 0.0)
+    with np.errstate(invalid="ignore", over="ignore"):
+        errors = np.nan_to_num(np.abs(found - right.values), nan=np.inf)
+    shares = np.divide(errors, value, out=np.zeros(value.shape), where=told)
+    if not shares.size:
+        return None
+    i, j, k = (int(place) for place in np.unravel_index(int(shares.argmax()), shares.shape))
+    return EvaluationLoss(float(shares[i, j, k]), float(abs(points[k])), i, j)
+
+
+def _is_uneven(A: FloatArray) -> bool:
+    """Return whether balancing changes A so much that doing without it may lose a part of 1e-6."""
+    balanced, _, _, factors, _ = dgebal(A, scale=1, permute=0)
+    change = np.linalg.norm(A) / np.linalg.norm(balanced) * (factors.max() / factors.min())
+    return bool(change > UNEVEN)
