@@ -8,7 +8,7 @@ y, relative errors of eps in every entry change the response by
     eps (|y|^T (|P_0| + |s| |P_1| + |s|^2 |P_2|) |x| + |y|^T |B| + |F| |x| + |D|).           (DATA)
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,7 +41,7 @@ def refined_response(
     points: ComplexArray,
     *,
     exact_powers: tuple[int, ...] = (),
-    steps: Callable[[Iterator[int]], Iterator[int]] = iter,
+    advance: Callable[[int], None] = lambda _: None,
 ) -> RefinedResponse:
     """Evaluate a dense model at every point.
 
@@ -52,8 +52,8 @@ def refined_response(
     points : (k,) complex ndarray
     exact_powers : tuple of int
         Of s in P whose coefficients no rounding touches, such as the unit matrix of a state space.
-    steps : callable
-        Goes through the numbers of the points, and may show how far it is.
+    advance : callable
+        Is told how many points are done since the last call.
 
     Examples
     --------
@@ -69,12 +69,10 @@ def refined_response(
     found = RefinedResponse(np.full(shape, np.nan, dtype=np.complex128), *sizes)
     evaluator = _Evaluator(P, B, F, D, exact_powers)
     held = max(1, FACTORS_HELD // max(1, P[0].size))
-    places: list[int] = []
-    for place in steps(iter(range(points.size))):
-        places.append(place)
-        if len(places) == held or place == points.size - 1:
-            evaluator.into(found, points, places)
-            places = []
+    for start in range(0, points.size, held):
+        places = list(range(start, min(start + held, points.size)))
+        evaluator.into(found, points, places)
+        advance(len(places))
     return found
 
 

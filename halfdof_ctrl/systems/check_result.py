@@ -7,6 +7,7 @@ from halfdof_ctrl.systems.judged import Grade
 WIDTH = 79  #: columns of the printed table, as terminals have them
 FIGURES = 37  #: columns in front of the place of the worst error
 VERDICTS = {Grade.OK: "ok", Grade.WITHIN: "within", Grade.FAILED: "FAILED"}
+NONE = "(none)"  #: where nothing was compared
 WITHIN = "ok within what the numbers allow"
 
 
@@ -83,16 +84,20 @@ class CrossCheck:
             ("poles", self.max_pole_error, self.pole_allowed, self.pole_grade, self.pole_worst),
             ("step", self.max_step_error, self.step_allowed, self.step_grade, self.step_worst),
         ]
+        count = VERDICTS[Grade(self.count_grade)] if self.n_finite >= 0 else NONE
+        figures = [(what, f"{e:.1e}", f"{a:.1e}" if a else "", VERDICTS[Grade(g)], w) for what, e, a, g, w in judged]
+        step = [
+            ("ct.step", f"{self.step_evaluation_error:.1e}", "", "", f"python-control, {self.step_evaluation_worst}")
+        ]
+        if self.step_horizon == 0.0:
+            figures[-1], step = ("step", "", "", NONE, self.step_worst), []
         return (
-            ("states", f"{self.order}", "", VERDICTS[Grade(self.count_grade)], self._count()),
-            *[
-                (what, f"{e:.1e}", f"{a:.1e}" if a else "", VERDICTS[Grade(g)], where)
-                for what, e, a, g, where in judged
-            ],
+            ("states", f"{self.order}", "", count, self._count()),
+            *figures,
             ("data", "", f"{self.data_limit:.1e}", "", f"entries of M, C, K known to {self.known_to:.1e}"),
             ("doubles", "", f"{self.double_limit:.1e}", "", "rounding of A, B, C, D"),
             ("sys(s)", f"{self.evaluation_error:.1e}", "", "", f"python-control, {self.evaluation_worst}"),
-            ("ct.step", f"{self.step_evaluation_error:.1e}", "", "", f"python-control, {self.step_evaluation_worst}"),
+            *step,
             ("slycot", "", "", "", self.slycot),
         )
 

@@ -32,6 +32,7 @@ class RefinedPoles:
     values: ComplexArray  #: (N,) [rad/s]
     bounds: FloatArray  #: (N,) what relative errors of eps in A move each [rad/s]
     at_origin: npt.NDArray[np.bool_]  #: (N,) which are not told from zero
+    gaps: FloatArray  #: (N,) distance of each from the next [rad/s]
 
 
 def refined_poles(A: FloatArray) -> RefinedPoles:
@@ -44,7 +45,7 @@ def refined_poles(A: FloatArray) -> RefinedPoles:
     ([-1000000000.0, 1e-09], [False, False])
     """
     if A.size == 0:
-        return RefinedPoles(np.zeros(0, dtype=np.complex128), np.zeros(0), np.zeros(0, dtype=bool))
+        return RefinedPoles(np.zeros(0, dtype=np.complex128), np.zeros(0), np.zeros(0, dtype=bool), np.zeros(0))
     matrix = balanced(np.asarray(A, dtype=float))
     triple = scipy.linalg.eig(matrix, left=True, right=True)
     values, left, right = (np.asarray(part, dtype=np.complex128) for part in triple)
@@ -67,7 +68,7 @@ def refined_poles(A: FloatArray) -> RefinedPoles:
         conjugates = np.flatnonzero((values.imag > 0.0) & isolated)
         found[conjugates + 1], bounds[conjugates + 1] = found[conjugates].conj(), bounds[conjugates]
         # LAPACK puts conjugates side by side
-    return RefinedPoles(found, bounds, (np.abs(found) <= bounds) | (np.abs(values) <= coarse))
+    return RefinedPoles(found, bounds, (np.abs(found) <= bounds) | (np.abs(values) <= coarse), gaps)
 
 
 def _first_order(

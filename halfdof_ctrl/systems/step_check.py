@@ -13,7 +13,6 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.descriptor.radau import Segment, descriptor_step_response, step_plan, system_step_response
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.judged import Judged, graded, safety
@@ -91,7 +90,7 @@ def _by_control(data: StateSpaceData, plan: tuple[Segment, ...], inputs: int) ->
     """Follow the responses to a step of the first inputs as python-control does, (p, inputs, k)."""
     A, B, C, D = data
     found = np.empty((len(C), inputs, sum(segment.steps for segment in plan)))
-    for j in progress(range(inputs), "step responses"):
+    for j in range(inputs):
         system = control.StateSpace(A, B[:, [j]], C, D[:, [j]], 0)
         state, done = np.zeros(len(A)), 0
         for segment in plan:

@@ -5,13 +5,13 @@ little: there the value that the channel has at a frequency 0.1 % away counts. A
 rounding, has no value: it is measured by the sizes of its output and its input.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
-from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.refined_response import RefinedResponse, refined_response
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -38,21 +38,28 @@ class TransferCheck:
     evaluation_worst: str
 
 
-def compare_transfer(model: SecondOrderModel, sys: control.StateSpace, points: ComplexArray) -> TransferCheck:
-    """Compare at points that are no poles.
+def compare_transfer(
+    model: SecondOrderModel,
+    sys: control.StateSpace,
+    points: ComplexArray,
+    exact: RefinedResponse,
+    advance: Callable[[int], None] = lambda _: None,
+) -> TransferCheck:
+    """Compare at points that are no poles what the descriptor form says there.
 
     Parameters
     ----------
     model : SecondOrderModel
-        Real, dense, regular.
+        Real and regular.
     sys : control.StateSpace
         With the model's inputs and outputs.
     points : (k,) complex ndarray
+    exact : RefinedResponse
+        Of the model.
+    advance : callable
+        Is told of every point that is done.
     """
-    exact = refined_response(
-        *model.quadratics, points, steps=lambda places: progress(places, "points", total=points.size)
-    )
-    found = system_response(sys, points)
+    found = system_response(sys, points, advance)
     known, many = max(model.known_to / EPS, 1.0), safety(len(model.dofs))
     size, data = np.abs(exact.values), exact.data * known
     is_zero = ~(size > many * data).any(axis=2, keepdims=True)
@@ -82,10 +89,12 @@ def compare_transfer(model: SecondOrderModel, sys: control.StateSpace, points: C
     )
 
 
-def system_response(sys: control.StateSpace, points: ComplexArray) -> RefinedResponse:
+def system_response(
+    sys: control.StateSpace, points: ComplexArray, advance: Callable[[int], None] = lambda _: None
+) -> RefinedResponse:
     """Evaluate a state space by refined solves; what rounding changes is that of its doubles."""
     A, B, C, D = StateSpaceData.of(sys)
-    return refined_response([-A, np.eye(len(A))], [B], [C], [D], points, exact_powers=(1,))
+    return refined_response([-A, np.eye(len(A))], [B], [C], [D], points, exact_powers=(1,), advance=advance)
 
 
 def _evaluation_loss(
