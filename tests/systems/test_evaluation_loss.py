@@ -1,0 +1,74 @@
+"""The warning before python-control's evaluation loses digits: where it does, and not where it does not."""
+
+import warnings
+
+import control
+import numpy as np
+import pytest
+
+from halfdof_ctrl import hydromount, mech2ss, mechss
+from halfdof_ctrl.errors import LostDigitsWarning
+from halfdof_ctrl.systems.evaluation_loss import WARNED, evaluation_loss, is_even
+from halfdof_ctrl.systems.state_space import system_of_model
+from halfdof_ctrl.systems.transfer_check import system_response
+from support.beams import cantilever
+
+SIZE = 30.0  # a measured loss is right to this factor: another frequency nearby loses another part of it
+
+
+@pytest.mark.parametrize("elements", [40, 80])
+def test_beams_are_warned_of_and_the_cure_is_named(elements: int) -> None:
+    """A cantilever in DOF states: the frequency, the size and `states="scaled"`, which warns of nothing."""
+    with pytest.warns(LostDigitsWarning, match=r'python-control\'s evaluation of them .* states="scaled"'):
+        mech2ss(cantilever(elements))
+    for states in ("scaled", "energy"):
+        mech2ss(cantilever(elements), states=states)  # type: ignore[arg-type]  # a literal each
+
+
+def test_the_loss_is_that_of_python_control() -> None:
+    """Measured at one frequency, against refined solves there."""
+    sys = system_of_model(cantilever(80))
+    loss = evaluation_loss(sys)
+    assert loss is not None
+    point = np.array([1j * loss.omega])
+    right = system_response(sys, point).values[loss.output, loss.source, 0]
+    found = np.asarray(sys(point, squeeze=False))[loss.output, loss.source, 0]
+    assert loss.value > WARNED
+    assert loss.value / SIZE < abs(found / right - 1.0) < loss.value * SIZE
+
+
+def test_well_posed_models_are_quiet() -> None:
+    """The paper's mount, and 100 random mounts in SI units with all kinds of DOFs: at most one warning."""
+    said = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        mech2ss(hydromount())
+        generator = np.random.default_rng(0)
+        for _ in range(100):
+            mech2ss(_mount(generator, int(generator.integers(2, 9))))
+        said = [warning for warning in caught if issubclass(warning.category, LostDigitsWarning)]
+    assert len(said) <= 1
+
+
+def _mount(generator: np.random.Generator, n: int) -> object:
+    kind = generator.integers(0, 3, n)
+    M = np.diag(np.where(kind == 0, generator.uniform(1.0, 300.0, n), 0.0))
+    links = np.eye(n) - np.eye(n, k=1)
+    damping, stiffness = 10.0 ** generator.uniform(1, 4, n), 10.0 ** generator.uniform(4, 6, n)
+    damped = (kind < 2)[:, None] * (kind < 2)
+    return mechss(M, (links.T * damping @ links + np.diag(damping)) * damped, links.T * stiffness @ links)
+
+
+def test_even_entries_need_no_look() -> None:
+    """Ratios up to 1e5 among the entries that are not zero, small and large matrices alike."""
+    for n in (2, 40):
+        A = -np.eye(n) - np.eye(n, k=1)
+        assert is_even(A)
+        A[0, -1] = 1e6
+        assert not is_even(A)
+    assert is_even(np.zeros((0, 0)))
+
+
+def test_inside_the_package_nothing_is_warned_of() -> None:
+    """Whoever balances loses nothing, so that there is nothing to say."""
+    assert isinstance(system_of_model(cantilever(40)), control.StateSpace)
