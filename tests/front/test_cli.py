@@ -20,7 +20,7 @@ from halfdof_ctrl.design.lqr import lqr
 from halfdof_ctrl.files.models import save_model
 from halfdof_ctrl.files.systems import load_system
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
-from halfdof_ctrl.systems.crosscheck import CrossCheck
+from halfdof_ctrl.systems.check_result import CrossCheck
 from support.fe_files import C, K, M, abaqus, matrix_market
 from support.fe_models import spring_grid
 
@@ -39,7 +39,7 @@ def _in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 def failing(check: CrossCheck) -> CrossCheck:
     """Let a check miss a state."""
     values = {key: getattr(check, key) for key in check.__slots__}
-    return CrossCheck(**{**values, "n_finite": check.n_finite + 1, "max_pole_error": float("inf")})
+    return CrossCheck(**{**values, "n_finite": check.n_finite + 1, "count_grade": 2, "max_pole_error": float("inf")})
 
 
 def table(path: str) -> list[list[str]]:

@@ -1,6 +1,7 @@
 """The cross-check: it passes what is right, fails what is wrong by 1e-6, and raises no false alarm."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import control
 import numpy as np
@@ -23,10 +24,13 @@ from halfdof_ctrl.base.errors import (
     ImproperError,
     MatrixError,
     SingularPencilError,
+    recording_warnings,
 )
 from halfdof_ctrl.systems.judged import Grade
 from halfdof_ctrl.systems.pole_check import compare_poles
 from halfdof_ctrl.systems.refined_poles import refined_poles
+from halfdof_ctrl.systems.state_space import system_of_model
+from support.beams import cantilever
 from support.benchmark_circuits import hinged_beam, rotor_in_rigid_bearing, two_track_mount
 from support.benchmark_mechanisms import gear_train, seven_body_mechanism
 from support.benchmark_problems import intersection, mobile_manipulator, qep_with_two_infinite_eigenvalues
@@ -350,3 +354,91 @@ def test_double_eigenvalue_split_by_rounding_is_none() -> None:
     for split, passes in ((1e-8, True), (1e-6, False)):
         poles = refined_poles(np.diag([-1.0 - split, -1.0 + split]))
         assert (compare_poles(model, poles, twice, np.zeros(2), 1.0).grade != Grade.FAILED) is passes
+
+
+def test_three_things_are_told_apart_on_a_beam() -> None:
+    """40 elements: the state space is right to what its doubles allow, python-control's evaluation of it is not."""
+    model = cantilever(40)
+    check = crosscheck(model, system_of_model(model))
+    assert check.verdict.startswith("ok within what the numbers allow (")
+    assert 1e-10 < check.max_transfer_error <= check.transfer_allowed
+    assert check.evaluation_error > 1e3 * check.max_transfer_error
+    assert check.passed
+
+
+def test_energy_states_of_a_beam_are_ok_without_allowance() -> None:
+    """The same beam in states that keep the digits."""
+    model = cantilever(20)
+    assert crosscheck(model, mech2ss(model, states="energy")).verdict.startswith("ok")
+
+
+def test_a_wrong_step_response_of_python_control_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is measured as it is."""
+    right = control.forced_response
+
+    def off(*given: object, **options: object) -> control.TimeResponseData:
+        response = right(*given, **options)
+        response.y = response.y * (1.0 + 1e-6)
+        return response
+
+    monkeypatch.setattr(control, "forced_response", off)
+    check = crosscheck(mount("mass"), mech2ss(mount("mass")))
+    assert check.verdict == "ok"
+    assert check.step_evaluation_error == pytest.approx(1e-6, rel=1e-3)
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e-6, 1e6])
+def test_outputs_that_are_zero_for_every_input_raise_no_alarm(unit: float) -> None:
+    """A mass that nothing drives, a DOF that a constraint holds, and a difference that is always zero."""
+    M, K = np.diag([2.0, 1.0, 3.0, 0.0]), np.diag([7.0, 5.0, 11.0, 0.0])
+    K[2, 3] = K[3, 2] = unit
+    model = mechss(M, 0.1 * M, K, [1.0, 0, 0, 0], [[0, unit, 0, 0], [0, 0, unit, 0], [1, 0, 0, 0]])
+    check = crosscheck(model, mech2ss(model))
+    assert check.verdict == "ok", check
+    sys = mech2ss(model)
+    C = np.array(sys.C)
+    C[0, 0] = 1e-6 * np.abs(C).max()
+    assert not crosscheck(model, control.ss(sys.A, sys.B, C, sys.D)).passed
+
+
+def test_entries_with_six_digits_allow_what_six_digits_determine() -> None:
+    """The same error of 1e-8 in A is a fault of a model of doubles, and within what a file with six digits says."""
+    model = mount("mass")
+    sys = mech2ss(model)
+    A = np.array(sys.A)
+    A[3, 0] *= 1.0 + 1e-8
+    wrong = control.ss(A, sys.B, sys.C, sys.D)
+    assert crosscheck(model, wrong).verdict == "failed"
+    rough = crosscheck(replace(model, known_to=5e-7), wrong)
+    assert rough.verdict.startswith("ok within what the numbers allow (")
+    assert rough.data_limit > 1e-7
+    assert "known to 5.0e-07" in repr(rough)
+
+
+@pytest.mark.parametrize("power", [40, 42, 44, 46, 48])
+def test_a_rank_near_rounding_is_announced_by_both_sides(power: int) -> None:
+    """A last mass of 1 + 2^-power: four states, where the stored numbers have five; neither side fails the other."""
+    M = np.ones((3, 3))
+    M[2, 2] += 2.0**-power
+    model = mechss(M, np.diag([3.0, 1, 2]), [[15, -5, -5], [-5, 10, -2], [-5, -2, 18]])
+    with recording_warnings() as caught:
+        structure = pencil_structure(model)
+    assert structure.uncertainty
+    assert structure.fewest_finite == 4
+    assert structure.most_finite == 5
+    assert (len(caught) == 1) is (structure.finite_eigenvalues.size == 5)
+    with recording_warnings():
+        sys = system_of_model(model)
+        check = crosscheck(model, sys)
+    assert sys.nstates == 4
+    assert check.passed
+    assert check.max_transfer_error < 1e-9
+
+
+def test_long_names_leave_the_table_readable() -> None:
+    """Names of forty letters are shortened in the table and whole in the attributes."""
+    names = [f"displacement_of_the_engine_at_its_mount_{k}" for k in range(2)]
+    model = mechss(np.eye(2), np.eye(2), 2 * np.eye(2), dofs=names)
+    check = crosscheck(model, mech2ss(model))
+    assert max(map(len, repr(check).splitlines())) < 80
+    assert check.transfer_worst.startswith("displacement_of_the_engine_at_its_mount_")
