@@ -392,7 +392,8 @@ def test_outputs_that_are_zero_for_every_input_raise_no_alarm(unit: float) -> No
     """A mass that nothing drives, a DOF that a constraint holds, and a difference that is always zero."""
     M, K = np.diag([2.0, 1.0, 3.0, 0.0]), np.diag([7.0, 5.0, 11.0, 0.0])
     K[2, 3] = K[3, 2] = unit
-    model = mechss(M, 0.1 * M, K, [1.0, 0, 0, 0], [[0, unit, 0, 0], [0, 0, unit, 0], [1, 0, 0, 0]])
+    F = np.array([[0.0, unit, 0.0, 0.0], [0.0, 0.0, unit, 0.0], [1.0, 0.0, 0.0, 0.0]])
+    model = mechss(M, 0.1 * M, K, [1.0, 0, 0, 0], F)
     check = crosscheck(model, mech2ss(model))
     assert check.verdict == "ok", check
     sys = mech2ss(model)

@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from halfdof_ctrl import hydromount, mech2ss, mechss
+from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
 from halfdof_ctrl.errors import LostDigitsWarning
 from halfdof_ctrl.systems.evaluation_loss import WARNED, evaluation_loss, is_even
 from halfdof_ctrl.systems.state_space import system_of_model
@@ -22,7 +22,7 @@ def test_beams_are_warned_of_and_the_cure_is_named(elements: int) -> None:
     with pytest.warns(LostDigitsWarning, match=r'python-control\'s evaluation of them .* states="scaled"'):
         mech2ss(cantilever(elements))
     for states in ("scaled", "energy"):
-        mech2ss(cantilever(elements), states=states)  # type: ignore[arg-type]  # a literal each
+        mech2ss(cantilever(elements), states=states)
 
 
 def test_the_loss_is_that_of_python_control() -> None:
@@ -50,7 +50,7 @@ def test_well_posed_models_are_quiet() -> None:
     assert len(said) <= 1
 
 
-def _mount(generator: np.random.Generator, n: int) -> object:
+def _mount(generator: np.random.Generator, n: int) -> SecondOrderModel:
     kind = generator.integers(0, 3, n)
     M = np.diag(np.where(kind == 0, generator.uniform(1.0, 300.0, n), 0.0))
     links = np.eye(n) - np.eye(n, k=1)

@@ -1,5 +1,7 @@
 """The cross-check of large sparse models: it passes what is right, fails what is wrong, and says what it leaves out."""
 
+from typing import Any
+
 import control
 import numpy as np
 import pytest
@@ -15,7 +17,8 @@ def chain(n: int, masses: int) -> SecondOrderModel:
     """Join n points by springs; some have a mass, some others a damper to the ground."""
     generator = np.random.default_rng(0)
     k = generator.uniform(1.0, 10.0, n + 1) * 1e3
-    K = csc_array(diags_array([k[:-1] + k[1:], -k[1:-1], -k[1:-1]], offsets=[0, 1, -1]))
+    diagonals: Any = [k[:-1] + k[1:], -k[1:-1], -k[1:-1]]
+    K = csc_array(diags_array(diagonals, offsets=[0, 1, -1]))
     m, c, b = np.zeros(n), np.zeros(n), np.zeros(n)
     m[np.linspace(5, n - 5, masses).astype(int)] = generator.uniform(1.0, 2.0, masses)
     c[:: n // 7] = generator.uniform(1.0, 2.0, c[:: n // 7].size)
