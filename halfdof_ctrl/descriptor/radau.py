@@ -26,6 +26,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 STAGES = 5
 REFINEMENTS = 2  #: of a solution, by residuals in twice the working precision: rounding of M is no state
+MOST_REFINED = 200  #: unknowns up to which solutions are refined, which takes several times as long as to find them
 RESOLUTION = 0.25  #: step length times the size of the fastest eigenvalue that still moves
 GONE = 33.0  #: time constants after which a mode is below rounding, exp(-33) = 5e-15
 GROWN = 5.0  #: time constants for which a growing mode is followed, which multiplies rounding by exp(5) = 150
@@ -159,7 +160,7 @@ class RadauStep:
         change, slope = np.zeros_like(x), np.zeros_like(x)
         for mode, factor in zip(_modes(), self.factors, strict=True):
             part = scipy.linalg.lu_solve(factor, right)
-            for _ in range(REFINEMENTS):
+            for _ in range(REFINEMENTS if len(self.A) <= MOST_REFINED else 0):
                 part += scipy.linalg.lu_solve(factor, self.exact.residual(self.h * mode.eigenvalue, part, right))
             part *= self.columns
             change += (mode.to_change * part).real

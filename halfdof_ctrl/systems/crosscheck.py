@@ -44,9 +44,9 @@ from halfdof_ctrl.systems.sparse_check import (
 from halfdof_ctrl.systems.step_check import StepCheck, compare_steps
 from halfdof_ctrl.systems.transfer_check import TransferCheck, compare_transfer
 
-POINT_WORK = 6e9  #: points times the cubes of DOFs and states, which takes about as long as the eigenvalues do
+POINT_WORK = 5e9  #: points times the cubes of DOFs and states, which takes about as long as the eigenvalues do
 POINT_VALUES = 2**22  #: values of all channels at all points
-FEWEST_POINTS = 40  #: for the largest models
+FEWEST_POINTS = 24  #: for the largest models
 
 
 def crosscheck(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
@@ -207,6 +207,7 @@ def _count_grade(order: int, structure: PencilStructure) -> int:
 
 def _most_points(model: SecondOrderModel, sys: control.StateSpace) -> int:
     """Return how many points the size of a model allows, so that they take no longer than its eigenvalues."""
-    cubes = len(model.dofs) ** 3 + sys.nstates**3
+    n, N, signals = len(model.dofs), sys.nstates, sum(model.D.shape)
+    cubes = n**3 + N**3 + 4 * signals * (n**2 + N**2)
     by_work, by_values = POINT_WORK / max(cubes, 1), POINT_VALUES / max(model.D.size, 1)
     return int(max(FEWEST_POINTS, min(by_work, by_values)))

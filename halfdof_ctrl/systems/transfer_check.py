@@ -1,8 +1,9 @@
 """The transfer function of a state space against that of the descriptor form, both by refined solves.
 
 An error is relative to the value of its channel at that point. Beside a zero or an undamped resonance a value says
-little: there the value that the channel has at a frequency 0.1 % away counts. A channel that is zero, or zero but for
-rounding, has no value: it is measured by the sizes of its output and its input.
+little: there the value that the channel has at a frequency 0.1 % away counts, and deep in the roll-off, where states
+have digits that the output does not show, a millionth of the channel's largest value. A channel that is zero, or zero
+but for rounding, has no value: it is measured by the sizes of its output and its input.
 """
 
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from halfdof_ctrl.systems.judged import Judged, graded, safety
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the value
+DEEP = 1e-6  #: of a channel's largest value: deeper in the roll-off, errors are relative to that
 NEARBY = 1e-3  #: relative change of frequency: beside a zero the value so far away counts
 BESIDE_AXIS = 2e-3  #: points nearer to the imaginary axis, as a part of their size, are what plots show
 ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
@@ -66,7 +68,8 @@ def compare_transfer(
     is_zero |= ~(size > ROUNDING_OF_ZERO * _by_signals(np.where(is_zero, 0.0, size))).any(axis=2, keepdims=True)
     scale = _by_signals(np.where(is_zero, 0.0, size))
     scale = np.where(scale > 0.0, scale, np.nan_to_num(exact.natural).max(axis=2, keepdims=True))
-    value = np.where(is_zero, scale, np.maximum(size, NEARBY * exact.slope))
+    deep = DEEP * np.nan_to_num(size).max(axis=2, keepdims=True)
+    value = np.where(is_zero, scale, np.maximum(np.maximum(size, NEARBY * exact.slope), deep))
     value = np.where(value > 0.0, value, 1.0)  # no response at all, or none determined
     room = np.where(is_zero, ROUNDING_OF_ZERO * scale, 0.0) + many * (data + _finite(found.data))
     determined = np.isfinite(exact.values)
