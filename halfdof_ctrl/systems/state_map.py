@@ -267,8 +267,9 @@ def _state_maps(reduction: ExactReduction) -> tuple[FloatArray, ...]:
 def map_of_form(form: EnergyForm, states: States, reduction: ExactReduction) -> StateMap:
     """Return the map of energy coordinates, its T on the states that `mech2ss` gives by default."""
     require_same_order(form, reduction)
-    T, T_inverse = form.T, form.T_inverse
-    if reduction.states != form.dofs:  # coordinates that are mixed, or in another order
+    if reduction.states == form.dofs:
+        T, T_inverse = form.T, form.T_inverse
+    else:  # coordinates that are mixed, or in another order
         from_q, from_v = _state_maps(reduction)[:2]
         T_inverse = from_q @ form.displacement.X + from_v @ form.velocity.X
         T = form.from_q @ reduction.motion(0).X + form.from_v @ reduction.motion(1).X

@@ -11,11 +11,14 @@ It would fill exact zeros with roundings; above the first entry of a column of K
 
 import numpy as np
 import scipy.linalg
-from scipy.linalg.lapack import dpotrf
+from scipy.linalg.blas import dtrmm
+from scipy.linalg.lapack import dpocon, dpotrf, dsygst, dtrtri
+from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
-from halfdof_ctrl.base.matrix_residual import exact_residual
+from halfdof_ctrl.base.arrays import EPS, FloatArray, powers_of_two
+from halfdof_ctrl.base.gram_residual import FEW_ENTRIES, gram_residual
 
+PLAIN_CONDITION = 256.0  #: of a matrix at unit diagonal, up to which rounding of its factor does no harm: 6e-14
 CORRECTED_FACTOR = 1e-8  #: a correction of this size leaves errors of its square, which is below rounding
 MOST_CORRECTIONS = 3  #: one does, but for matrices that are singular to twelve digits
 DIVERGED_FACTOR = 0.5  #: a correction of this size does not come from rounding: the factor is of no use
@@ -42,23 +45,39 @@ def corrected_factor(K: FloatArray) -> FloatArray | None:
     diagonal = np.diagonal(K)
     if not (diagonal > 0.0).all():
         return None
-    if np.count_nonzero(K) == len(K):
+    if is_diagonal(K):
         return np.diag(np.sqrt(diagonal))
     scale = powers_of_two(np.sqrt(diagonal))
     scaled = scale[:, None] * K * scale
-    U, failed = dpotrf(scaled, lower=0, clean=1)
+    U, failed = dpotrf(scaled.T, lower=0, clean=1)
     if failed:
         return None
-    inside = _envelope(scaled)
+    norm = float(np.abs(scaled).sum(axis=0).max())
+    if PLAIN_CONDITION * float(dpocon(U, norm)[0]) < 1.0:
+        U = _corrected(scaled, U)
+    return None if U is None else np.asarray(U / scale)
+
+
+def _corrected(K: FloatArray, U: FloatArray) -> FloatArray | None:
+    """Apply (23) until nothing is left to correct."""
+    inside = _envelope(K)
+    few = np.count_nonzero(inside) <= FEW_ENTRIES * inside.size
     for _ in range(MOST_CORRECTIONS):
-        G = _congruent(U, exact_residual(scaled, U.T, U))
-        size = float(np.abs(G).max(initial=0.0))
+        G, _ = dsygst(gram_residual(K, U), U)  # of both only the upper triangles
+        size = float(np.abs(np.triu(G)).max(initial=0.0))
         if not size < DIVERGED_FACTOR:
             return None
-        U = U + np.where(inside, (np.triu(G, 1) + np.diag(np.diagonal(G) / 2.0)) @ U, 0.0)
+        np.einsum("ii->i", G)[:] /= 2.0
+        change = (csc_array(U).T @ np.triu(G).T).T if few else dtrmm(1.0, G, U)
+        U = U + np.where(inside, change, 0.0)
         if size <= CORRECTED_FACTOR:
             break
-    return np.asarray(U / scale)
+    return U
+
+
+def is_diagonal(matrix: FloatArray) -> bool:
+    """Tell whether all entries besides the diagonal are zero."""
+    return bool(np.count_nonzero(matrix) == np.count_nonzero(np.diagonal(matrix)))
 
 
 def solved(U: FloatArray, right: FloatArray, *, transposed: bool = False) -> FloatArray:
@@ -68,12 +87,13 @@ def solved(U: FloatArray, right: FloatArray, *, transposed: bool = False) -> Flo
     return np.asarray(scipy.linalg.solve_triangular(U, right, trans="T" if transposed else "N", check_finite=False))
 
 
-def _congruent(U: FloatArray, E: FloatArray) -> FloatArray:
-    """Return ``U^-T E U^-1`` for a symmetric E."""
-    half = solved(U, E, transposed=True)
-    return solved(U, half.T, transposed=True)
+def inverse(U: FloatArray) -> FloatArray:
+    """Return ``U^-1`` for an upper triangular U."""
+    return np.asarray(dtrtri(U)[0]) if U.size else np.array(U)
 
 
 def _envelope(K: FloatArray) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
     """Mark the entries from the first nonzero one of each column down to the diagonal."""
-    return np.triu(np.logical_or.accumulate(K != 0.0, axis=0))
+    first = np.argmax(K != 0.0, axis=0)
+    rows = np.arange(len(K))[:, None]
+    return (rows >= first) & (rows <= np.arange(len(K)))

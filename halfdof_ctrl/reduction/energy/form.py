@@ -16,6 +16,7 @@ motion without mass has its displacement at a support as its one state. Derivati
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,8 +24,9 @@ from halfdof_ctrl.base.arrays import EPS, LARGEST_DENSE_COPY, FloatArray, IndexA
 from halfdof_ctrl.base.errors import EnergyFormError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
+from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, inverse, solved
 from halfdof_ctrl.reduction.energy.free_motion import FreeMotions, free_motions
+from halfdof_ctrl.reduction.energy.mass import MassFactor, product
 from halfdof_ctrl.reduction.energy.parts import HalfDamping, Parts, energy_parts
 from halfdof_ctrl.reduction.energy.rigid import StiffnessFactor, indefinite_error, stiffness_factor
 from halfdof_ctrl.reduction.method.signals import Signal, absorbed, trimmed
@@ -43,15 +45,25 @@ class EnergyForm:
     from_q: FloatArray  #: (N, n) and ...
     from_v: FloatArray  #: (N, n) x = from_q q + from_v q'
     states: tuple[str, ...]  #: names of the N states
-    dofs: tuple[str, ...]  #: names of the states of which `T` transforms: q_i, q_c, q'_i
-    T: FloatArray  #: (N, N) x = T x_dofs; a gain on DOF states is K_dofs = K T
-    T_inverse: FloatArray  #: (N, N) x_dofs = T_inverse x; weights are Q = T_inverse^T Q_dofs T_inverse
+    dofs: tuple[str, ...]  #: names of the states that `T` transforms: q_i, q_c, q'_i
+    position: IndexArray  #: (n_i + n_c,) DOFs whose displacements are `dofs`: the n_i inertial ones, then the half ones
+    n_inertial: int  #: n_i
     n_rigid: int  #: number of free motions, whose displacements are the first states
     n_massive: int  #: number of them with mass, whose momenta come next
     n_strains: int  #: number of strains, which follow; the rest are momenta
     nearest: (
         float  #: energy over rounding, ratio (25) over eps, of the softest motion that is not free; inf if not near
     )
+
+    @property
+    def T(self) -> FloatArray:  # noqa: N802
+        """(N, N) x = T x_dofs; a gain on DOF states is K_dofs = K T."""
+        return np.hstack([self.from_q[:, self.position], self.from_v[:, self.position[: self.n_inertial]]])
+
+    @property
+    def T_inverse(self) -> FloatArray:  # noqa: N802
+        """(N, N) x_dofs = T_inverse x; weights are Q = T_inverse^T Q_dofs T_inverse."""
+        return np.vstack([self.displacement.X[self.position], self.velocity.X[self.position[: self.n_inertial]]])
 
     @property
     def output(self) -> Signal:
@@ -93,14 +105,15 @@ def energy_form(model: SecondOrderModel) -> EnergyForm:
     model = model.as_dense()
     parts = energy_parts(model)
     order = np.concatenate([parts.static, parts.moving])
-    factor = stiffness_factor(parts.K[np.ix_(order, order)], parts.static.size, tuple([model.dofs[j] for j in order]))
+    K = parts.K[np.ix_(order, order)] if parts.static.size else parts.K
+    factor = stiffness_factor(K, parts.static.size, tuple([model.dofs[j] for j in order]))
     mass = corrected_factor(parts.M[np.ix_(parts.inertial, parts.inertial)])
     if mass is None:
         raise _mass_error(model, parts)
     if parts.moving.size == 0:
         msg = "There are no energy coordinates, since the model has no states: displacements follow the inputs at once."
         raise EnergyFormError(msg, reason="no states", dofs=model.dofs)
-    return _Assembly(model, parts, factor, mass).form()
+    return _Assembly(model, parts, factor, MassFactor(mass)).form()
 
 
 def energy_system(model: SecondOrderModel) -> EnergyForm | None:
@@ -145,7 +158,7 @@ def _mass_error(model: SecondOrderModel, parts: Parts) -> EnergyFormError:
 class _Assembly:
     """The blocks of (26), for one model."""
 
-    def __init__(self, model: SecondOrderModel, parts: Parts, factor: StiffnessFactor, mass: FloatArray) -> None:
+    def __init__(self, model: SecondOrderModel, parts: Parts, factor: StiffnessFactor, mass: MassFactor) -> None:
         self.model, self.parts, self.mass = model, parts, mass
         n_k = parts.static.size
         moving = parts.moving
@@ -154,10 +167,17 @@ class _Assembly:
         self.i, self.c = np.searchsorted(moving, parts.inertial), np.searchsorted(moving, parts.half)
         self.strained = factor.carried[n_k:] - n_k  # DOFs of r whose strains are the states
         self.damping = HalfDamping(parts, model.dofs)
-        self.C = parts.C[np.ix_(moving, moving)]
-        self.free: FreeMotions = free_motions(factor, n_k, self.i, mass, self.C)
+        self.C = parts.C if parts.moving.size == len(parts.C) else parts.C[np.ix_(moving, moving)]
+        self.free: FreeMotions = free_motions(factor, n_k, self.i, mass.R, self.C)
         self.nearest = factor.nearest
-        self.half = self._half_velocity()  # q'_c of the states, less what v_r carries along
+        n_p, n_m, n_z = self.free.count, self.free.massive, self.L.shape[1]
+        self.size = n_p + n_z + self.i.size
+        #: (p, v_r, z, v_e) of equation (26)
+        self.p, self.r, self.z, self.e = (
+            slice(*ends) for ends in pairwise((0, n_p, n_p + n_m, n_p + n_m + n_z, self.size))
+        )
+        self.momenta = self.free.across(mass.inverse())  # q'_i of v_e
+        self.half = self._half_velocity()
         self.driven_half = [self.damping.solve(B[self.c]) for B in self._inputs()]
 
     def form(self) -> EnergyForm:
@@ -169,8 +189,6 @@ class _Assembly:
         moving, inertial, half = self.parts.moving, self.parts.inertial, self.parts.half
         position = np.concatenate([inertial, half])
         names = [self.model.dofs[j] for j in position.tolist()]
-        dofs = (*names, *[f"{self.model.dofs[j]}_dot" for j in inertial.tolist()])
-        from_states = np.vstack([displacement.X[position], velocity.X[inertial]])
         return EnergyForm(
             model=self.model,
             A=read_only(A),
@@ -181,97 +199,96 @@ class _Assembly:
             from_q=read_only(from_q),
             from_v=read_only(from_v),
             states=self._names(moving),
-            dofs=dofs,
-            T=read_only(np.hstack([from_q[:, position], from_v[:, inertial]])),
-            T_inverse=read_only(from_states),
+            dofs=(*names, *[f"{self.model.dofs[j]}_dot" for j in inertial.tolist()]),
+            position=read_only(position),
+            n_inertial=inertial.size,
             n_rigid=self.free.count,
             n_massive=self.free.massive,
             n_strains=self.L.shape[1],
             nearest=self.nearest,
         )
 
-    def _over_mass(self, rows: FloatArray) -> FloatArray:
-        """Return ``rows R^-1``."""
-        return solved(self.mass, rows.T, transposed=True).T
-
     def _half_velocity(self) -> FloatArray:
         """Return q'_c as a function of (p, v_r, z, v_e), without the inputs and what v_r carries along."""
-        free, n_c = self.free, self.c.size
-        C_ci, C_cc = self.C[np.ix_(self.c, self.i)], self.damping
-        of_strain = -C_cc.solve(self.L[self.c])
-        of_momentum = -C_cc.solve(self._over_mass(C_ci) @ free.complement)
-        of_rigid = -C_cc.solve(free.damping[self.c])
-        return np.hstack([np.zeros((n_c, free.count)), of_rigid, of_strain, of_momentum])
+        half = np.zeros((self.c.size, self.size))
+        if self.c.size:
+            half[:, self.r] = self.free.damping[self.c]
+            half[:, self.z] = self.L[self.c]
+            half[:, self.e] = product(self.C[np.ix_(self.c, self.i)], self.momenta)
+            half = -self.damping.solve(half)
+        return half
 
     def _equations(self) -> tuple[FloatArray, list[FloatArray]]:
         """Return A and what the inputs and their derivatives drive."""
-        free, L, C = self.free, self.L, self.C
-        n_p, n_m, n_z, n_e = free.count, free.massive, L.shape[1], free.complement.shape[1]
-        size = n_p + n_m + n_z + n_e
-        p, r, z, e = np.split(np.arange(size), np.cumsum([n_p, n_m, n_z]))
-        velocity = np.zeros((len(L), size))  # q'_r less Phi v_r
-        velocity[np.ix_(self.i, e)] = solved(self.mass, free.complement)
-        velocity[self.c] = self.half
-        A = np.zeros((size, size))
-        A[p] = free.rates @ velocity[free.supports]
-        A[np.ix_(p, r)] += free.carried_rates
-        A[z] = L.T @ velocity
-        forces = -(C[self.i] @ velocity)
-        forces[:, r] -= free.damping[self.i]
-        forces[:, z] -= L[self.i]
-        A[e] = free.complement.T @ solved(self.mass, forces, transposed=True)
-        A[r] = -(free.resisted @ velocity)
-        A[np.ix_(r, r)] -= free.resisted_rigid
-        self._mirror(A, z, e)
+        free, mass, L, C, half = self.free, self.mass, self.L, self.C, self.half
+        p, r, z, e = self.p, self.r, self.z, self.e
+        L_c, C_ic = L[self.c], C[np.ix_(self.i, self.c)]
+        A = np.zeros((self.size, self.size))
+        A[z, e] = free.across(mass.over(L[self.i].T))  # skew to the last bit, but for what half DOFs do
+        A[e, z] = -A[z, e].T
+        resisted = product(C if self.i.size == len(C) else C[np.ix_(self.i, self.i)], self.momenta)
+        if self.c.size:
+            resisted += product(C_ic, half[:, e])
+            A[z] += product(L_c.T, half)
+            A[e, z] -= free.along(mass.under(product(C_ic, half[:, z])))
+        A[e, e] = -free.along(mass.under(resisted)) if resisted.any() else 0.0
+        if free.count:
+            velocity = np.zeros((len(L), self.size))  # q'_r less Phi v_r
+            velocity[self.i, e] = self.momenta
+            velocity[self.c] = half
+            A[p] = free.rates @ velocity[free.supports]
+            A[p, r] += free.carried_rates
+            A[e, r] = -free.along(mass.under(product(C_ic, half[:, r]) + free.damping[self.i]))
+            A[r] = -(free.resisted @ velocity)
+            A[r, r] -= free.resisted_rigid
         A += 0.0  # without negative zeros
-        driven = []
-        for B, of_half in zip(self._inputs(), self.driven_half, strict=True):
-            direct = np.zeros((len(L), B.shape[1]))
-            direct[self.c] = of_half
-            part = np.zeros((size, B.shape[1]))
-            part[p] = free.rates @ direct[free.supports]
-            part[z] = L.T @ direct
-            pushed = B[self.i] - C[self.i] @ direct
-            part[e] = free.complement.T @ solved(self.mass, pushed, transposed=True)
-            part[r] = free.balance.T @ B - free.resisted @ direct
-            driven.append(part)
-        return A, driven
+        return A, [self._driven(B, of_half) for B, of_half in zip(self._inputs(), self.driven_half, strict=True)]
 
-    def _mirror(self, A: FloatArray, z: IndexArray, e: IndexArray) -> None:
-        """Let what is skew without half DOFs be skew to the last bit."""
-        if not self.c.size:
-            A[np.ix_(e, z)] = -A[np.ix_(z, e)].T
+    def _driven(self, B: FloatArray, of_half: FloatArray) -> FloatArray:
+        """Return what one coefficient of the inputs drives."""
+        free = self.free
+        part = np.zeros((self.size, B.shape[1]))
+        pushed = B[self.i]
+        if self.c.size:
+            pushed = pushed - product(self.C[np.ix_(self.i, self.c)], of_half)
+            part[self.z] = product(self.L[self.c].T, of_half)
+        part[self.e] = free.along(self.mass.under(pushed))
+        if free.count:
+            direct = np.zeros((len(self.L), B.shape[1]))
+            direct[self.c] = of_half
+            part[self.p] = free.rates @ direct[free.supports]
+            part[self.r] = free.balance.T @ B - free.resisted @ direct
+        return part
 
     def _inputs(self) -> list[FloatArray]:
         """Return what the inputs, their first and second derivatives do to q_r, static DOFs condensed."""
         model, static, moving = self.model, self.parts.static, self.parts.moving
         given = trimmed(model.quadratics.B) or (model.B,)
-        return [
-            B[moving] - self.U_kr.T @ solved(self.U_kk, B[static], transposed=True) if static.size else B[moving]
-            for B in given
-        ]
+        if not static.size:
+            return list(given)
+        return [B[moving] - self.U_kr.T @ solved(self.U_kk, B[static], transposed=True) for B in given]
 
     def _motion(self, shift: tuple[FloatArray, ...]) -> tuple[Signal, Signal]:
         """Return displacements and velocities of all DOFs as functions of states and inputs."""
         model, parts, free = self.model, self.parts, self.free
         n, m, n_r = len(model.dofs), model.B.shape[1], len(self.L)
-        n_p, n_m, n_z, n_e = free.count, free.massive, self.L.shape[1], free.complement.shape[1]
-        size = n_p + n_m + n_z + n_e
-        q_r, v_r = np.zeros((2, n_r, size))
-        q_r[:, :n_p] = free.motions
-        held = np.zeros((n_r, n_z))
-        held[self.strained] = solved(self.L[self.strained].T, np.eye(n_z))
-        q_r[:, n_p + n_m : n_p + n_m + n_z] = held - free.massive_motions @ (free.momenta @ held[self.i])
-        v_r[self.i, n_p + n_m + n_z :] = solved(self.mass, free.complement)
+        q_r, v_r = np.zeros((2, n_r, self.size))
+        q_r[:, self.p] = free.motions
+        q_r[self.strained, self.z] = inverse(self.L[self.strained].T)
+        if free.massive:
+            q_r[:, self.z] -= free.massive_motions @ (free.momenta @ q_r[self.i, self.z])
+        v_r[self.i, self.e] = self.momenta
         v_r[self.c] = self.half
-        v_r[:, n_p : n_p + n_m] += free.carried
+        v_r[:, self.r] += free.carried
         inputs = [np.asarray(B, dtype=float) for B in trimmed(model.quadratics.B)]
         to_half = [np.zeros((n_r, m)) for _ in inputs]
         for place, of_half in zip(to_half, self.driven_half, strict=False):
             place[self.c] = of_half
+        if not parts.static.size:
+            return _shifted(q_r, [], shift), _shifted(v_r, to_half, shift)
         flexible = [solved(self.U_kk, solved(self.U_kk, B[parts.static], transposed=True)) for B in inputs]
         across = -solved(self.U_kk, self.U_kr)
-        q, v = np.zeros((2, n, size))
+        q, v = np.zeros((2, n, self.size))
         q[parts.moving], v[parts.moving] = q_r, v_r
         q[parts.static], v[parts.static] = across @ q_r, across @ v_r
         q_u = [np.zeros((n, m)) for _ in inputs]
@@ -286,13 +303,13 @@ class _Assembly:
     def _states_from_motion(self) -> tuple[FloatArray, FloatArray]:
         """Return the maps of ``x = from_q q + from_v q'``."""
         parts, free, n = self.parts, self.free, len(self.model.dofs)
-        n_p, n_m, n_z, n_e = free.count, free.massive, self.L.shape[1], free.complement.shape[1]
-        from_q, from_v = np.zeros((2, n_p + n_m + n_z + n_e, n))
+        n_p, n_m = free.count, free.massive
+        from_q, from_v = np.zeros((2, self.size, n))
         from_q[:n_m, parts.inertial] = free.momenta
         from_q[n_m:n_p, parts.moving[free.supports]] = free.rates[n_m:]
-        from_q[n_p + n_m : n_p + n_m + n_z, parts.moving] = self.L.T
-        from_v[n_p : n_p + n_m, parts.inertial] = free.momenta
-        from_v[n_p + n_m + n_z :, parts.inertial] = free.complement.T @ self.mass
+        from_q[self.z, parts.moving] = self.L.T
+        from_v[self.r, parts.inertial] = free.momenta
+        from_v[self.e, parts.inertial] = free.along(self.mass.R)
         return from_q, from_v
 
     def _names(self, moving: IndexArray) -> tuple[str, ...]:
@@ -304,7 +321,7 @@ class _Assembly:
         if free.massive == 0:
             momenta = [f"momentum_{dofs[j]}" for j in self.parts.inertial.tolist()]
         else:
-            momenta = [f"momentum{k + 1}" for k in range(free.complement.shape[1])]
+            momenta = [f"momentum{k + 1}" for k in range(self.i.size - free.massive)]
         return (*rigid, *rates, *strains, *momenta)
 
 
@@ -321,4 +338,6 @@ def motion_output(model: SecondOrderModel, A: FloatArray, B: FloatArray, q: Sign
 
 def _shifted(X: FloatArray, U: list[FloatArray], shift: tuple[FloatArray, ...]) -> Signal:
     """Write ``w = X x + ...`` in terms of x~ of equation (5)."""
+    if not shift:
+        return Signal(X, trimmed(tuple(U)))
     return Signal(X, trimmed(tuple(U))).plus(Signal(np.zeros_like(X), tuple([X @ part for part in shift])))

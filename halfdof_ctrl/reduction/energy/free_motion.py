@@ -32,7 +32,8 @@ class FreeMotions:
     motions: FloatArray  #: (r, d) Phi_m, then Phi_0
     massive: int  #: n_m
     momenta: FloatArray  #: (n_m, n_i) Phi_m,i^T M
-    complement: FloatArray  #: (n_i, n_i - n_m) N, orthonormal, orthogonal to R Phi_m
+    reflectors: FloatArray  #: (n_i, n_m) V and ...
+    weighed: FloatArray  #: (n_m, n_i) Y of N, the last columns of I - V Y: orthonormal, orthogonal to R Phi_m
     rates: FloatArray  #: (d, d) of p' from velocities at the supports; zero for motions with mass
     carried_rates: FloatArray  #: (d, n_m) of p' from v_r
     carried: FloatArray  #: (r, n_m) Phi_m + Phi_0 G: the velocities that belong to v_r
@@ -45,6 +46,16 @@ class FreeMotions:
     def count(self) -> int:
         """Number of free motions, d."""
         return int(self.motions.shape[1])
+
+    def across(self, rows: FloatArray) -> FloatArray:
+        """Return ``rows N``."""
+        n_m = self.massive
+        return rows[:, n_m:] - (rows @ self.reflectors) @ self.weighed[:, n_m:] if n_m else rows
+
+    def along(self, columns: FloatArray) -> FloatArray:
+        """Return ``N^T columns``."""
+        n_m = self.massive
+        return columns[n_m:] - self.weighed[:, n_m:].T @ (self.reflectors.T @ columns) if n_m else columns
 
     @property
     def massive_motions(self) -> FloatArray:
@@ -77,12 +88,11 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
     if d == 0:
         return _none(len(C), n_i)
     carried = mass @ motions[i]
-    decomposed = scipy.linalg.qr(carried, mode="full", pivoting=True)
-    Q, triangle = (np.asarray(part, dtype=np.float64) for part in decomposed[:2])
-    order = decomposed[2]
+    (raw, tau), triangle, order = scipy.linalg.qr(carried, mode="raw", pivoting=True)
     terms = np.linalg.norm(np.abs(mass) @ np.abs(motions[i]), axis=0)[order]
     length = np.array([np.linalg.norm(triangle[k:, k]) if k < n_i else 0.0 for k in range(d)])
     n_m = int(np.count_nonzero(length > MASSLESS_MOMENTUM * len(C) * EPS * terms))
+    reflectors, weighed = _reflectors(raw[:, :n_m], tau[:n_m])
     corner, beside = triangle[:n_m, :n_m], triangle[:n_m, n_m:]
     turned = motions[:, order]
     with_mass = solved(corner, turned[:, :n_m].T, transposed=True).T
@@ -97,7 +107,8 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
         motions=np.hstack([with_mass, without]),
         massive=n_m,
         momenta=(mass.T @ (mass @ with_mass[i])).T,
-        complement=Q[:, n_m:],
+        reflectors=reflectors,
+        weighed=weighed,
         rates=rates,
         carried_rates=np.vstack([np.eye(n_m), rates[n_m:] @ along[supports]]),
         carried=along,
@@ -106,6 +117,17 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
         resisted=resisted,
         resisted_rigid=balance.T @ C_motion if resisted.any() else np.zeros((n_m, n_m)),
     )
+
+
+def _reflectors(raw: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return V and Y = S V^T of ``H_1 H_2 ... = I - V S V^T``, for reflectors ``H_k = I - tau_k v_k v_k^T``.
+
+    ``S^-1 = striu(V^T V) + diag(1 / tau)`` (C. Puglisi, 1992).
+    """
+    reflects = tau != 0.0
+    V = np.where(reflects, np.tril(raw, -1) + np.eye(*raw.shape), 0.0)
+    inverse = np.triu(V.T @ V, 1) + np.diag(1.0 / np.where(reflects, tau, 1.0))
+    return V, solved(inverse, V.T)
 
 
 def _carrying(C: FloatArray, with_mass: FloatArray, without: FloatArray) -> FloatArray:
@@ -129,7 +151,8 @@ def _none(size: int, n_i: int) -> FreeMotions:
         motions=np.zeros((size, 0)),
         massive=0,
         momenta=np.zeros((0, n_i)),
-        complement=np.eye(n_i),
+        reflectors=np.zeros((n_i, 0)),
+        weighed=np.zeros((0, n_i)),
         rates=np.zeros((0, 0)),
         carried_rates=np.zeros((0, 0)),
         carried=np.zeros((size, 0)),

@@ -71,8 +71,6 @@ def modal_form(form: EnergyForm) -> EnergyForm:
         from_q=read_only(W.T @ form.from_q),
         from_v=read_only(W.T @ form.from_v),
         states=(*form.states[:first], *modes, *relaxing),
-        T=read_only(W.T @ form.T),
-        T_inverse=read_only(form.T_inverse @ W),
     )
 
 

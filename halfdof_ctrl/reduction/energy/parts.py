@@ -21,6 +21,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 SAME_ENTRY = 4 * EPS  #: entries above and below the diagonal that differ by this part of the larger are the same
 TURNED_ENTRY = 16 * EPS  #: ... or by this part of their diagonal entries: T^T K T with elements at an angle, rounded
 SINGULAR_DAMPING = 16.0  #: times n eps: a smaller reciprocal condition number of C_cc is rounding
+PLAIN_DAMPING = 1.0 / 256.0  #: from this reciprocal condition number on, solutions with C_cc are not refined
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -64,11 +65,13 @@ def energy_parts(model: SecondOrderModel) -> Parts:
 
 def _symmetric(matrix: npt.NDArray[np.float64], letter: Literal["M", "K"], dofs: tuple[str, ...]) -> FloatArray:
     """Return a matrix that is symmetric but for rounding of its entries, symmetric."""
+    if np.array_equal(matrix, matrix.T):
+        return np.asarray(matrix, dtype=float)
     larger = np.maximum(np.abs(matrix), np.abs(matrix.T))
     gap = np.abs(matrix - matrix.T)
     size = np.sqrt(np.abs(np.diagonal(matrix)))
     if (gap <= np.maximum(SAME_ENTRY * larger, TURNED_ENTRY * np.outer(size, size))).all():
-        return (matrix + matrix.T) / 2.0 if gap.any() else np.asarray(matrix, dtype=float)
+        return np.asarray((matrix + matrix.T) / 2.0)
     row, column = np.unravel_index(int(np.argmax(gap / np.where(larger > 0.0, larger, 1.0))), gap.shape)
     names = (dofs[int(row)], dofs[int(column)])
     msg = (
@@ -91,6 +94,7 @@ class HalfDamping:
         self.matrix = self.rows[:, None] * C * self.columns
         self.factors = None
         self.diagonal: FloatArray | None = None  #: of C_cc, where each half DOF has a damper of its own
+        self.is_plain = True
         if C.size == 0:
             return
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -103,17 +107,18 @@ class HalfDamping:
                 "combination of them is static. Keep states='dofs', or give one of them its small mass or damper."
             )
             raise EnergyFormError(msg, reason="singular damping", dofs=tuple(names))
-        self.factors = (factors, pivots)
+        self.factors, self.is_plain = (factors, pivots), rcond >= PLAIN_DAMPING
         if np.count_nonzero(C) == np.count_nonzero(np.diagonal(C)):
             self.diagonal = np.diagonal(C)
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return ``C_cc^-1 right``, refined once with an exact residual."""
+        """Return ``C_cc^-1 right``, refined once with an exact residual unless C_cc is well conditioned."""
         if self.factors is None:
             return np.array(right)
         if self.diagonal is not None:
             return np.asarray(right / self.diagonal[:, None])
         scaled = self.rows[:, None] * right
         x = scipy.linalg.lu_solve(self.factors, scaled, check_finite=False)
-        x += scipy.linalg.lu_solve(self.factors, exact_residual(scaled, self.matrix, x), check_finite=False)
+        if not self.is_plain:
+            x += scipy.linalg.lu_solve(self.factors, exact_residual(scaled, self.matrix, x), check_finite=False)
         return np.asarray(self.columns[:, None] * x)
