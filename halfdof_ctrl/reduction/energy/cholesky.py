@@ -13,10 +13,10 @@ import numpy as np
 import scipy.linalg
 from scipy.linalg.blas import dtrmm
 from scipy.linalg.lapack import dpocon, dpotrf, dsygst, dtrtri
-from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray, powers_of_two
-from halfdof_ctrl.base.gram_residual import FEW_ENTRIES, gram_residual
+from halfdof_ctrl.base.arrays import FloatArray, powers_of_two
+from halfdof_ctrl.base.gram_residual import gram_residual
+from halfdof_ctrl.base.matrix_residual import by_columns, has_few_entries
 
 PLAIN_CONDITION = 256.0  #: of a matrix at unit diagonal, up to which rounding of its factor does no harm: 6e-14
 CORRECTED_FACTOR = 1e-8  #: a correction of this size leaves errors of its square, which is below rounding
@@ -61,14 +61,14 @@ def corrected_factor(K: FloatArray) -> FloatArray | None:
 def _corrected(K: FloatArray, U: FloatArray) -> FloatArray | None:
     """Apply (23) until nothing is left to correct."""
     inside = _envelope(K)
-    few = np.count_nonzero(inside) <= FEW_ENTRIES * inside.size
+    few = has_few_entries(inside)
     for _ in range(MOST_CORRECTIONS):
         G, _ = dsygst(gram_residual(K, U), U)  # of both only the upper triangles
         size = float(np.abs(np.triu(G)).max(initial=0.0))
         if not size < DIVERGED_FACTOR:
             return None
         np.einsum("ii->i", G)[:] /= 2.0
-        change = (csc_array(U).T @ np.triu(G).T).T if few else dtrmm(1.0, G, U)
+        change = (by_columns(U).T @ np.triu(G).T).T if few else dtrmm(1.0, G, U)
         U = U + np.where(inside, change, 0.0)
         if size <= CORRECTED_FACTOR:
             break
@@ -96,4 +96,4 @@ def _envelope(K: FloatArray) -> np.ndarray[tuple[int, int], np.dtype[np.bool_]]:
     """Mark the entries from the first nonzero one of each column down to the diagonal."""
     first = np.argmax(K != 0.0, axis=0)
     rows = np.arange(len(K))[:, None]
-    return (rows >= first) & (rows <= np.arange(len(K)))
+    return np.asarray((rows >= first) & (rows <= np.arange(len(K))))

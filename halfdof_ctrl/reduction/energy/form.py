@@ -178,7 +178,13 @@ class _Assembly:
         )
         self.momenta = self.free.across(mass.inverse())  # q'_i of v_e
         self.half = self._half_velocity()
-        self.driven_half = [self.damping.solve(B[self.c]) for B in self._inputs()]
+        given = trimmed(model.quadratics.B) or (model.B,)
+        self.pressed = [solved(self.U_kk, B[parts.static], transposed=True) for B in given]
+        #: what the inputs, their first and second derivatives do to q_r, static DOFs condensed
+        self.inputs = [
+            B[moving] - self.U_kr.T @ bent if n_k else B for B, bent in zip(given, self.pressed, strict=True)
+        ]
+        self.driven_half = [self.damping.solve(B[self.c]) for B in self.inputs]
 
     def form(self) -> EnergyForm:
         """Put the blocks together."""
@@ -242,7 +248,7 @@ class _Assembly:
             A[r] = -(free.resisted @ velocity)
             A[r, r] -= free.resisted_rigid
         A += 0.0  # without negative zeros
-        return A, [self._driven(B, of_half) for B, of_half in zip(self._inputs(), self.driven_half, strict=True)]
+        return A, [self._driven(B, of_half) for B, of_half in zip(self.inputs, self.driven_half, strict=True)]
 
     def _driven(self, B: FloatArray, of_half: FloatArray) -> FloatArray:
         """Return what one coefficient of the inputs drives."""
@@ -260,14 +266,6 @@ class _Assembly:
             part[self.r] = free.balance.T @ B - free.resisted @ direct
         return part
 
-    def _inputs(self) -> list[FloatArray]:
-        """Return what the inputs, their first and second derivatives do to q_r, static DOFs condensed."""
-        model, static, moving = self.model, self.parts.static, self.parts.moving
-        given = trimmed(model.quadratics.B) or (model.B,)
-        if not static.size:
-            return list(given)
-        return [B[moving] - self.U_kr.T @ solved(self.U_kk, B[static], transposed=True) for B in given]
-
     def _motion(self, shift: tuple[FloatArray, ...]) -> tuple[Signal, Signal]:
         """Return displacements and velocities of all DOFs as functions of states and inputs."""
         model, parts, free = self.model, self.parts, self.free
@@ -280,19 +278,18 @@ class _Assembly:
         v_r[self.i, self.e] = self.momenta
         v_r[self.c] = self.half
         v_r[:, self.r] += free.carried
-        inputs = [np.asarray(B, dtype=float) for B in trimmed(model.quadratics.B)]
-        to_half = [np.zeros((n_r, m)) for _ in inputs]
-        for place, of_half in zip(to_half, self.driven_half, strict=False):
+        to_half = [np.zeros((n_r, m)) for _ in self.inputs]
+        for place, of_half in zip(to_half, self.driven_half, strict=True):
             place[self.c] = of_half
         if not parts.static.size:
             return _shifted(q_r, [], shift), _shifted(v_r, to_half, shift)
-        flexible = [solved(self.U_kk, solved(self.U_kk, B[parts.static], transposed=True)) for B in inputs]
+        flexible = [solved(self.U_kk, bent) for bent in self.pressed]
         across = -solved(self.U_kk, self.U_kr)
         q, v = np.zeros((2, n, self.size))
         q[parts.moving], v[parts.moving] = q_r, v_r
         q[parts.static], v[parts.static] = across @ q_r, across @ v_r
-        q_u = [np.zeros((n, m)) for _ in inputs]
-        v_u = [np.zeros((n, m)) for _ in range(len(inputs) + 1)]
+        q_u = [np.zeros((n, m)) for _ in self.inputs]
+        v_u = [np.zeros((n, m)) for _ in range(len(self.inputs) + 1)]
         for k, (own, bend) in enumerate(zip(to_half, flexible, strict=True)):
             q_u[k][parts.static] = bend
             v_u[k][parts.moving] += own

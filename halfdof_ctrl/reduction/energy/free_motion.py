@@ -88,7 +88,8 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
     if d == 0:
         return _none(len(C), n_i)
     carried = mass @ motions[i]
-    (raw, tau), triangle, order = scipy.linalg.qr(carried, mode="raw", pivoting=True)
+    decomposed, triangle, order = scipy.linalg.qr(carried, mode="raw", pivoting=True)
+    raw, tau, triangle = (np.asarray(part, dtype=np.float64) for part in (*decomposed, triangle))
     terms = np.linalg.norm(np.abs(mass) @ np.abs(motions[i]), axis=0)[order]
     length = np.array([np.linalg.norm(triangle[k:, k]) if k < n_i else 0.0 for k in range(d)])
     n_m = int(np.count_nonzero(length > MASSLESS_MOMENTUM * len(C) * EPS * terms))

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from halfdof_ctrl.base.arrays import FloatArray, is_zero
-from halfdof_ctrl.base.gram_residual import FEW_ENTRIES
+from halfdof_ctrl.base.matrix_residual import has_few_entries
 from halfdof_ctrl.reduction.energy.cholesky import inverse, is_diagonal, solved
 
 
@@ -25,10 +25,6 @@ class MassFactor:
         """Return ``R^-T columns``."""
         return solved(self.R, columns, transposed=True) if self.diagonal is None else columns / self.diagonal
 
-    def solve(self, columns: FloatArray) -> FloatArray:
-        """Return ``R^-1 columns``."""
-        return solved(self.R, columns) if self.diagonal is None else columns / self.diagonal
-
     def inverse(self) -> FloatArray:
         """Return ``R^-1``."""
         return inverse(self.R) if self.diagonal is None else np.diag(1.0 / self.diagonal[:, 0])
@@ -44,6 +40,6 @@ def product(matrix: FloatArray, right: FloatArray) -> FloatArray:
     """
     if is_zero(matrix):
         return np.zeros((matrix.shape[0], right.shape[1]))
-    if np.count_nonzero(matrix) <= FEW_ENTRIES * matrix.size:
+    if has_few_entries(matrix):
         return np.asarray(csr_array(matrix) @ right)
     return np.asarray(matrix @ right)

@@ -17,11 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from scipy.linalg.lapack import dpotrf, dpstrf
+from scipy.linalg.lapack import dpocon, dpotrf, dpstrf
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, powers_of_two
 from halfdof_ctrl.base.errors import EnergyFormError
-from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
+from halfdof_ctrl.base.exact_products import SlicedMatrix
+from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual, sliced
 from halfdof_ctrl.base.names import removal_of
 from halfdof_ctrl.reduction.energy.cholesky import corrected_factor, solved
 
@@ -29,6 +30,7 @@ SMALL_PIVOT = 128.0  #: times n eps of the diagonal: a smaller pivot may stand f
 NEXT_MODE_RATIO = 1e3  #: the ratio (25) of the next mode is larger than that of a free motion by this factor
 NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
 FIRST_PREFERRED = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
+SURELY_DEFINITE = 1e-10  #: reciprocal condition number from which on rounding does not decide about definiteness
 INVERSE_ITERATIONS = 8
 REFINEMENTS = 2
 
@@ -78,20 +80,23 @@ def stiffness_factor(K: FloatArray, first: int, names: tuple[str, ...]) -> Stiff
     positive = np.diagonal(K) > 0.0
     scale = np.where(positive, powers_of_two(np.sqrt(np.abs(np.diagonal(K)))), 1.0)
     scaled = scale[:, None] * K * scale
-    U = corrected_factor(scaled)
-    if U is not None and (np.diagonal(U) ** 2 > SMALL_PIVOT * n * EPS * np.diagonal(scaled)).all():
-        return _whole(U, scale)
+    plain, failed = dpotrf(scaled.T, lower=0)
+    if not failed and (np.diagonal(plain) ** 2 > SMALL_PIVOT * n * EPS * np.diagonal(scaled)).all():
+        U = corrected_factor(scaled)
+        if U is not None:
+            return _whole(U, scale)
     candidates = _candidates(scaled, first, names)
-    motions = _null_vectors(scaled, candidates, names)
-    free, rest = _free_motions(scaled, motions, names)
-    nearest = min(rest, _next_ratio(scaled, candidates, motions) if free.shape[1] == candidates.size else np.inf)
-    largest = _ratios(scaled, free).max(initial=0.0)
+    exact = sliced(scaled)
+    free, rest = _free_motions(scaled, exact, candidates.motions, names)
+    nearest = min(rest, _next_ratio(scaled, exact, candidates) if free.shape[1] == candidates.supports.size else np.inf)
+    largest = _ratios(scaled, exact, free).max(initial=0.0)
     if free.shape[1] == 0 or nearest <= NEXT_MODE_RATIO * largest or nearest <= 1.0:
+        U = corrected_factor(scaled)
         if U is None:
-            raise _undecided(nearest, names, candidates)
+            raise _undecided(nearest, names, candidates.supports)
         return _whole(U, scale, nearest)
     supports = _supports(free, first)
-    factor = _with_supports(scaled, supports, names)
+    factor = _with_supports(scaled, supports, _definite(scaled, supports, names))
     return StiffnessFactor(
         U=factor.U / scale,
         carried=factor.carried,
@@ -139,15 +144,27 @@ def _undecided(nearest: float, names: tuple[str, ...], candidates: IndexArray) -
     return EnergyFormError(msg, reason="undecided", dofs=tuple([names[j] for j in candidates.tolist()]))
 
 
-def _candidates(K: FloatArray, first: int, names: tuple[str, ...]) -> IndexArray:
-    """Return the fewest DOFs without which K is positive definite, those with the smallest pivots."""
+def _candidates(K: FloatArray, first: int, names: tuple[str, ...]) -> StiffnessFactor:
+    """Take the fewest DOFs without which K is positive definite, those with the smallest pivots, as supports.
+
+    The motions are refined, so that a plain factor serves.
+    """
     order, rank = _pivots(K, first, names)
     for count in range(order.size - rank, order.size + 1):
-        candidates = np.sort(order[order.size - count :])
-        carried = np.setdiff1d(np.arange(len(K)), candidates)
-        if corrected_factor(K[np.ix_(carried, carried)]) is not None:
-            return candidates
+        supports = np.sort(order[order.size - count :])
+        carried = np.setdiff1d(np.arange(len(K)), supports)
+        inner = _surely_definite(K[np.ix_(carried, carried)])
+        if inner is not None:
+            return _with_supports(K, supports, inner)
     raise indefinite_error("K", list(names[:first]))
+
+
+def _surely_definite(K: FloatArray) -> FloatArray | None:
+    """Return a factor of K, the corrected one where rounding might decide whether there is one."""
+    U, failed = dpotrf(K.T, lower=0, clean=1)
+    if failed or K.size == 0 or not dpocon(U, float(np.abs(K).sum(axis=0).max()))[0] >= SURELY_DEFINITE:
+        return corrected_factor(K)
+    return np.asarray(U)
 
 
 def _pivots(K: FloatArray, first: int, names: tuple[str, ...]) -> tuple[IndexArray, int]:
@@ -176,17 +193,19 @@ def _floating_error(dof: str) -> EnergyFormError:
     return EnergyFormError(msg, reason="floating", dofs=(dof,))
 
 
-def _null_vectors(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> FloatArray:
-    return _with_supports(K, supports, names).motions
-
-
-def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> StiffnessFactor:
-    """Return the factor (24) and its null vectors, for given supports."""
+def _definite(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) -> FloatArray:
+    """Factorize K without the supports."""
     carried = np.setdiff1d(np.arange(len(K)), supports)
-    inner, beside = K[np.ix_(carried, carried)], K[np.ix_(carried, supports)]
-    factor = corrected_factor(inner)
+    factor = corrected_factor(K[np.ix_(carried, carried)])
     if factor is None:
         raise indefinite_error("K", [names[j] for j in carried.tolist()])
+    return factor
+
+
+def _with_supports(K: FloatArray, supports: IndexArray, factor: FloatArray) -> StiffnessFactor:
+    """Return the factor (24) and its null vectors, for given supports and the factor of what they carry."""
+    carried = np.setdiff1d(np.arange(len(K)), supports)
+    inner, beside = K[np.ix_(carried, carried)], K[np.ix_(carried, supports)]
     column = np.logical_or.accumulate(beside != 0.0, axis=0)
     across = solved(factor, beside, transposed=True)
     across += solved(factor, exact_residual(beside, factor.T, across), transposed=True)
@@ -194,31 +213,34 @@ def _with_supports(K: FloatArray, supports: IndexArray, names: tuple[str, ...]) 
     motions = np.zeros((len(K), supports.size))
     motions[supports] = np.eye(supports.size)
     held = -solved(factor, across)
+    exact = sliced(inner)
     for _ in range(REFINEMENTS):
-        held += solved(factor, solved(factor, exact_residual(-beside, inner, held), transposed=True))
+        held += solved(factor, solved(factor, exact_residual(-beside, exact, held), transposed=True))
     motions[carried] = held
     U = np.zeros((carried.size, len(K)))
     U[:, carried], U[:, supports] = factor, across
     return StiffnessFactor(U=U, carried=carried, supports=supports, motions=motions, nearest=np.inf)
 
 
-def _ratios(K: FloatArray, motions: FloatArray) -> FloatArray:
+def _ratios(K: FloatArray, exact: SlicedMatrix, motions: FloatArray) -> FloatArray:
     """Return the ratios (25) over eps, signed, of some motions."""
-    energy = np.einsum("ij,ij->j", motions, exact_product(K, motions))
+    energy = np.einsum("ij,ij->j", motions, exact_product(exact, motions))
     terms = np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions))
     return np.asarray(energy / np.where(terms > 0.0, terms * EPS, 1.0))
 
 
-def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) -> tuple[FloatArray, float]:
+def _free_motions(
+    K: FloatArray, exact: SlicedMatrix, motions: FloatArray, names: tuple[str, ...]
+) -> tuple[FloatArray, float]:
     """Return those combinations of candidates that are free by (25), and the smallest ratio of the others."""
     if motions.shape[1] == 0:
         return motions, np.inf
     size = np.sqrt(np.einsum("ij,ij->j", np.abs(motions), np.abs(K) @ np.abs(motions)))
     unit = motions / np.where(size > 0.0, size, 1.0)
-    energy = unit.T @ exact_product(K, unit)
+    energy = unit.T @ exact_product(exact, unit)
     _, turn = np.linalg.eigh((energy + energy.T) / 2.0)
     turned = unit @ turn
-    ratios = _ratios(K, turned)
+    ratios = _ratios(K, exact, turned)
     if (ratios < -1.0).any():
         worst = np.abs(turned[:, int(np.argmin(ratios))])
         raise indefinite_error("K", [names[j] for j in np.argsort(-worst, kind="stable")[:8].tolist()])
@@ -228,21 +250,20 @@ def _free_motions(K: FloatArray, motions: FloatArray, names: tuple[str, ...]) ->
     return turned[:, free], float(ratios[~free].min())
 
 
-def _next_ratio(K: FloatArray, supports: IndexArray, motions: FloatArray) -> float:
-    """Return the ratio (25) over eps of the softest motion beside those given, by inverse iteration."""
-    carried = np.setdiff1d(np.arange(len(K)), supports)
-    factor = corrected_factor(K[np.ix_(carried, carried)])
-    if factor is None or carried.size == 0:
+def _next_ratio(K: FloatArray, exact: SlicedMatrix, factor: StiffnessFactor) -> float:
+    """Return the ratio (25) over eps of the softest motion beside those that are free, by inverse iteration."""
+    carried = factor.carried
+    if carried.size == 0:
         return np.inf
-    basis = np.linalg.qr(motions)[0]
+    U, basis = factor.U[:, carried], np.linalg.qr(factor.motions)[0]
     x = np.random.default_rng(0).standard_normal((len(K), 1))
     for _ in range(INVERSE_ITERATIONS):
         x -= basis @ (basis.T @ x)
         held = np.zeros_like(x)
-        held[carried] = solved(factor, solved(factor, x[carried], transposed=True))
+        held[carried] = solved(U, solved(U, x[carried], transposed=True))
         x = held - basis @ (basis.T @ held)
         x /= np.linalg.norm(x)
-    return float(_ratios(K, x)[0])
+    return float(_ratios(K, exact, x)[0])
 
 
 def _supports(free: FloatArray, first: int) -> IndexArray:
