@@ -3,62 +3,68 @@
 from halfdof_ctrl.base import command_start as command_start  # before what takes time to import
 
 # isort: split
-from halfdof_ctrl import laws as laws  # `hd.laws`, a module and so no public name of its own
-from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
-from halfdof_ctrl.descriptor.zeros import zeros
-from halfdof_ctrl.design.lqr import StateFeedback, lqr
-from halfdof_ctrl.errors import HalfdofError
-from halfdof_ctrl.files.models import inspect_files, load_model, save_model
-from halfdof_ctrl.files.read_tables import load_response
-from halfdof_ctrl.files.systems import load_system, save_system
-from halfdof_ctrl.files.tables import save_response
-from halfdof_ctrl.model.descriptor_form import DescriptorForm
-from halfdof_ctrl.model.descriptor_system import DescriptorSystem, dss
-from halfdof_ctrl.model.elements import Damper, Force, Spring
-from halfdof_ctrl.model.law import Law
-from halfdof_ctrl.model.mechss import mechss
-from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.nonlinear.response import nonlinear_response
-from halfdof_ctrl.nonlinear.system import mech2nlsys
-from halfdof_ctrl.parts.assemble import assemble
-from halfdof_ctrl.parts.hydraulic import Decoupler, hydraulic_mount
-from halfdof_ctrl.parts.joints import Joint, Rigid
-from halfdof_ctrl.parts.loss_factor import MaxwellDampedModel, with_maxwell_damping
-from halfdof_ctrl.parts.masses import point_mass, rigid_body
-from halfdof_ctrl.parts.mounts import hydromount, hydromount_part
-from halfdof_ctrl.parts.prony import PronyFit, fit_prony
-from halfdof_ctrl.parts.rubber import generalized_maxwell, inerter, kelvin_voigt, maxwell, zener
-from halfdof_ctrl.plots import (
-    bode_plot,
-    dynamic_stiffness_plot,
-    pole_map_plot,
-    prony_plot,
-    step_plot,
-    sweep_plot,
-    transmissibility_plot,
-)
-from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.reduction.energy.port_hamiltonian import PortHamiltonian, port_hamiltonian
-from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.modal.modal_damping import with_modal_damping
-from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
-from halfdof_ctrl.report import write_report
-from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
-from halfdof_ctrl.sweeps.sweep import sweep
-from halfdof_ctrl.systems.check_result import CrossCheck
-from halfdof_ctrl.systems.crosscheck import crosscheck
-from halfdof_ctrl.systems.descriptor_systems import dss2ss
-from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
-from halfdof_ctrl.systems.state_map import StateMap, state_map
-from halfdof_ctrl.systems.state_space import mech2ss
-from halfdof_ctrl.systems.stiffness import (
-    dynamic_stiffness,
-    dynamic_stiffness_response,
-    transmissibility,
-    transmissibility_response,
-)
-from halfdof_ctrl.systems.time_response import forced_response, initial_response, step_response
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from halfdof_ctrl import errors as errors  # a module, as `laws` is, and so no public name of its own
+
+if TYPE_CHECKING:
+    from halfdof_ctrl import laws as laws
+    from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
+    from halfdof_ctrl.descriptor.zeros import zeros
+    from halfdof_ctrl.design.lqr import StateFeedback, lqr
+    from halfdof_ctrl.errors import HalfdofError
+    from halfdof_ctrl.files.models import inspect_files, load_model, save_model
+    from halfdof_ctrl.files.read_tables import load_response
+    from halfdof_ctrl.files.systems import load_system, save_system
+    from halfdof_ctrl.files.tables import save_response
+    from halfdof_ctrl.model.descriptor_form import DescriptorForm
+    from halfdof_ctrl.model.descriptor_system import DescriptorSystem, dss
+    from halfdof_ctrl.model.elements import Damper, Force, Spring
+    from halfdof_ctrl.model.law import Law
+    from halfdof_ctrl.model.mechss import mechss
+    from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
+    from halfdof_ctrl.model.second_order import SecondOrderModel
+    from halfdof_ctrl.nonlinear.response import nonlinear_response
+    from halfdof_ctrl.nonlinear.system import mech2nlsys
+    from halfdof_ctrl.parts.assemble import assemble
+    from halfdof_ctrl.parts.hydraulic import Decoupler, hydraulic_mount
+    from halfdof_ctrl.parts.joints import Joint, Rigid
+    from halfdof_ctrl.parts.loss_factor import MaxwellDampedModel, with_maxwell_damping
+    from halfdof_ctrl.parts.masses import point_mass, rigid_body
+    from halfdof_ctrl.parts.mounts import hydromount, hydromount_part
+    from halfdof_ctrl.parts.prony import PronyFit, fit_prony
+    from halfdof_ctrl.parts.rubber import generalized_maxwell, inerter, kelvin_voigt, maxwell, zener
+    from halfdof_ctrl.plots import (
+        bode_plot,
+        dynamic_stiffness_plot,
+        pole_map_plot,
+        prony_plot,
+        step_plot,
+        sweep_plot,
+        transmissibility_plot,
+    )
+    from halfdof_ctrl.reduction.choose import exact_reduction
+    from halfdof_ctrl.reduction.energy.port_hamiltonian import PortHamiltonian, port_hamiltonian
+    from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+    from halfdof_ctrl.reduction.modal.modal_damping import with_modal_damping
+    from halfdof_ctrl.reduction.modal.truncation import TruncatedModel, truncate_modes
+    from halfdof_ctrl.report import write_report
+    from halfdof_ctrl.sweeps.result import SweepFailure, SweepResult
+    from halfdof_ctrl.sweeps.sweep import sweep
+    from halfdof_ctrl.systems.check_result import CrossCheck
+    from halfdof_ctrl.systems.crosscheck import crosscheck
+    from halfdof_ctrl.systems.descriptor_systems import dss2ss
+    from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
+    from halfdof_ctrl.systems.state_map import StateMap, state_map
+    from halfdof_ctrl.systems.state_space import mech2ss
+    from halfdof_ctrl.systems.stiffness import (
+        dynamic_stiffness,
+        dynamic_stiffness_response,
+        transmissibility,
+        transmissibility_response,
+    )
+    from halfdof_ctrl.systems.time_response import forced_response, initial_response, step_response
 
 __version__ = "0.1.0"
 
@@ -141,6 +147,84 @@ __all__ = [
     "zener",
     "zeros",
 ]
+
+
+#: Where the public names are, to be imported when they are asked for: who needs a state space need not wait for the
+#: readers of files, and `import halfdof_ctrl` waits for nobody.
+_HOMES = {
+    "descriptor.structure": "PencilStructure pencil_structure",
+    "descriptor.zeros": "zeros",
+    "design.lqr": "StateFeedback lqr",
+    "errors": "HalfdofError",
+    "files.models": "inspect_files load_model save_model",
+    "files.read_tables": "load_response",
+    "files.systems": "load_system save_system",
+    "files.tables": "save_response",
+    "model.descriptor_form": "DescriptorForm",
+    "model.descriptor_system": "DescriptorSystem dss",
+    "model.elements": "Damper Force Spring",
+    "model.law": "Law",
+    "model.mechss": "mechss",
+    "model.nonlinear": "NonlinearModel nlmechss",
+    "model.second_order": "SecondOrderModel",
+    "nonlinear.response": "nonlinear_response",
+    "nonlinear.system": "mech2nlsys",
+    "parts.assemble": "assemble",
+    "parts.hydraulic": "Decoupler hydraulic_mount",
+    "parts.joints": "Joint Rigid",
+    "parts.loss_factor": "MaxwellDampedModel with_maxwell_damping",
+    "parts.masses": "point_mass rigid_body",
+    "parts.mounts": "hydromount hydromount_part",
+    "parts.prony": "PronyFit fit_prony",
+    "parts.rubber": "generalized_maxwell inerter kelvin_voigt maxwell zener",
+    "plots": "bode_plot dynamic_stiffness_plot pole_map_plot prony_plot step_plot sweep_plot transmissibility_plot",
+    "reduction.choose": "exact_reduction",
+    "reduction.energy.port_hamiltonian": "PortHamiltonian port_hamiltonian",
+    "reduction.exact_reduction": "ExactReduction",
+    "reduction.modal.modal_damping": "with_modal_damping",
+    "reduction.modal.truncation": "TruncatedModel truncate_modes",
+    "report": "write_report",
+    "sweeps.result": "SweepFailure SweepResult",
+    "sweeps.sweep": "sweep",
+    "systems.check_result": "CrossCheck",
+    "systems.crosscheck": "crosscheck",
+    "systems.descriptor_systems": "dss2ss",
+    "systems.frequency": "descriptor_response frequency_response",
+    "systems.state_map": "StateMap state_map",
+    "systems.state_space": "mech2ss",
+    "systems.stiffness": "dynamic_stiffness dynamic_stiffness_response transmissibility transmissibility_response",
+    "systems.time_response": "forced_response initial_response step_response",
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
+_MODULES = (
+    "base",
+    "descriptor",
+    "design",
+    "files",
+    "laws",
+    "model",
+    "nonlinear",
+    "parts",
+    "plots",
+    "reduction",
+    "report",
+    "sweeps",
+    "systems",
+)
+
+
+if not TYPE_CHECKING:  # who checks types knows the names, and is to say of others that there are none
+
+    def __getattr__(name: str) -> object:
+        """Import a public name, or a room, when it is first asked for."""
+        if name in _MODULES:
+            return import_module(f"halfdof_ctrl.{name}")
+        if name not in _HOME_OF:
+            msg = f"module 'halfdof_ctrl' has no attribute {name!r}"
+            raise AttributeError(msg)
+        value = getattr(import_module(f"halfdof_ctrl.{_HOME_OF[name]}"), name)
+        globals()[name] = value
+        return value
 
 
 def __dir__() -> list[str]:

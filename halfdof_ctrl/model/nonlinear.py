@@ -9,6 +9,7 @@ registers itself with `reduced` here, so that imports point down. Derivation: do
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import singledispatch
+from importlib import import_module
 from typing import Any, Protocol, TypeAlias
 
 import numpy as np
@@ -44,9 +45,15 @@ class Reduced(Protocol):
     def equilibrium(self, inputs: Values) -> Any: ...  # noqa: ANN401, D102
 
 
+REGISTERS = "halfdof_ctrl.nonlinear.reduction"  #: two floors above; no import of its own, for these point down
+
+
 @singledispatch
 def reduced(model: object) -> Reduced:
-    """Return the reduction of a nonlinear model; the room `nonlinear` registers how."""
+    """Return the reduction of a nonlinear model; the room `nonlinear` registers how, and is loaded for it."""
+    if isinstance(model, NonlinearModel):
+        import_module(REGISTERS)
+        return reduced(model)
     msg = f"A {type(model).__name__} is no nonlinear model. Make one by nlmechss."
     raise ParameterError(msg, parameter="model", value=model)
 

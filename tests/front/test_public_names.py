@@ -1,6 +1,10 @@
 """What a user sees of the package: the public names, each the thing it says, none hidden by a room."""
 
+import ast
 import pkgutil
+import subprocess
+import sys
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -42,3 +46,33 @@ def _attribute(name: str) -> object:
     for part in name.split(".")[1:]:
         found = getattr(found, part)
     return found
+
+
+def test_type_checkers_find_names_where_the_package_does() -> None:
+    """The imports that they read, and the places from which names are loaded when they are asked for."""
+    block = next(node for node in ast.parse(Path(hd.__file__).read_text()).body if isinstance(node, ast.If))
+    told = {
+        alias.name: str(node.module)
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+        if alias.name != "laws"
+    }
+    assert set(told) == set(hd.__all__)
+    for name, home in told.items():
+        assert getattr(sys.modules[home], name) is getattr(hd, name)
+
+
+def test_importing_the_package_waits_for_no_other() -> None:
+    """Neither python-control nor numpy is loaded before a name is asked for, and a room that is named is found."""
+    code = (
+        "import sys, halfdof_ctrl as hd; assert not {'control', 'numpy', 'scipy'} & {*sys.modules}; "
+        "assert hd.systems.__name__ == 'halfdof_ctrl.systems'; assert hd.mech2ss and 'control' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_a_name_that_does_not_exist_is_told_as_any_module_tells_it() -> None:
+    """An AttributeError with the name."""
+    with pytest.raises(AttributeError, match="module 'halfdof_ctrl' has no attribute 'mech2sss'"):
+        _ = hd.mech2sss  # type: ignore[attr-defined]
