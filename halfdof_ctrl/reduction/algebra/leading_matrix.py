@@ -8,7 +8,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
-from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling, max_scaling
 
 SINGULAR_RCOND = EPS  #: times n: W is singular below this reciprocal condition number
 LEAST_SIZE = 256  #: n in that bound at least
@@ -41,15 +41,22 @@ class LeadingMatrix:
     def factorized(cls, W: FloatArray) -> "LeadingMatrix":
         """Factorize and estimate the condition; scale first where that might matter.
 
-        A W that is well conditioned as it stands is so in the best units too. Otherwise it is scaled by the means
+        A W that is well conditioned as it stands, or with its rows and columns brought to one size, is so in the
+        best units too. Otherwise it is scaled by the means
         of the logarithms of its entries, which gives the same matrix whatever the units were, and by the best
         scaling after that if its condition still asks for it. So `rcond` is the same in any units up to what powers
         of two and the estimate leave, a factor of about four, or large enough in all of them.
         """
         enough = plainly_regular(len(W))
-        factors, pivots, rcond = _lu_and_rcond(W)
-        if rcond >= enough:
-            return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=None, rcond=rcond)
+        size = np.abs(W).sum(axis=0)
+        if size.min() >= enough * size.max():  # else its condition number is worse for that alone
+            factors, pivots, rcond = _lu_and_rcond(W)
+            if rcond >= enough:
+                return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=None, rcond=rcond)
+        if len(W) > FEW_DOFS:
+            leading = cls._scaled(W, max_scaling(W))
+            if leading.rcond >= enough:
+                return leading
         leading = cls._scaled(W, log_scaling(W, powers_of_two=True))
         if leading.rcond == 0.0 or leading.rcond >= enough:
             return leading
@@ -115,12 +122,13 @@ class LeadingMatrix:
         return size
 
     def solve(self, right: FloatArray) -> FloatArray:
-        """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled."""
+        """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled and its condition asks for it."""
         if self.rows is None or self.columns is None or self.scaled is None:
             return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
         right = right * self.rows[:, None]
         solution = dgetrs(self.factors, self.pivots, right)[0]
-        solution += dgetrs(self.factors, self.pivots, right - self.scaled @ solution)[0]
+        if self.rcond < PLAINLY_REGULAR_IF_SMALL:
+            solution += dgetrs(self.factors, self.pivots, right - self.scaled @ solution)[0]
         return np.asarray(solution * self.columns[:, None])
 
 

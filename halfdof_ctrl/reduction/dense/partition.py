@@ -95,6 +95,15 @@ class DofPartition:
             return np.asarray(matrix[:, self.order[first:stop]])
         return cancelled(matrix, self.basis[:, first:stop], self.sizes[:, first:stop])
 
+    def from_static(self, static: FloatArray) -> FloatArray:
+        """Return ``T_k p_k``, (n, k), for static coordinates p_k, (n_k, k)."""
+        first = self.n_inertial + self.n_half
+        if self.basis is not None:
+            return np.asarray(self.basis[:, first:] @ static)
+        q = np.zeros((self.order.size, static.shape[1]))
+        q[self.order[first:]] = static
+        return q
+
     def to_coordinates(self, displacements: FloatArray) -> FloatArray:
         """Return ``p = T^-1 q`` for an (n, k) array."""
         if self.basis is None:

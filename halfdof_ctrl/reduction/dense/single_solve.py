@@ -102,8 +102,9 @@ def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tu
     X[:, :moving] = partition.T[:, :moving]
     inputs: tuple[FloatArray, ...] = ()
     if moving < n:
-        T_k = partition.T[:, moving:]
-        X += T_k @ solved[moving:, :N]
-        inputs = tuple([T_k @ solved[moving:, start : start + m] for start in range(N, solved.shape[1], m)])
+        X += partition.from_static(solved[moving:, :N])
+        inputs = tuple(
+            [partition.from_static(solved[moving:, start : start + m]) for start in range(N, solved.shape[1], m)]
+        )
     q = Signal(X, trimmed(inputs))
     return q.plus(Signal(np.zeros_like(X), tuple([X @ part for part in shift]))) if shift else q
