@@ -247,7 +247,7 @@ def powers_of_two(size: FloatArray) -> FloatArray:
 
 def is_complex(matrix: Matrix) -> bool:
     """Return whether a checked matrix has imaginary parts."""
-    return matrix.dtype != REAL
+    return matrix.dtype is not REAL and matrix.dtype != REAL  # the first at once, for all but loaded arrays
 
 
 def is_zero(matrix: Matrix) -> bool:

@@ -48,8 +48,7 @@ class LeadingMatrix:
         of two and the estimate leave, a factor of about four, or large enough in all of them.
         """
         enough = plainly_regular(len(W))
-        size = np.abs(W).sum(axis=0)
-        if size.min() >= enough * size.max():  # else its condition number is worse for that alone
+        if len(W) <= FEW_DOFS or not _is_uneven(W, enough):
             factors, pivots, rcond = _lu_and_rcond(W)
             if rcond >= enough:
                 return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=None, rcond=rcond)
@@ -135,6 +134,12 @@ class LeadingMatrix:
 def plainly_regular(size: int) -> float:
     """Return the reciprocal condition number from which on W of so many DOFs needs no closer look."""
     return PLAINLY_REGULAR_IF_SMALL if size <= FEW_DOFS else PLAINLY_REGULAR
+
+
+def _is_uneven(W: FloatArray, enough: float) -> bool:
+    """Return whether sizes of columns differ by so much that the condition number is worse for that alone."""
+    size = np.abs(W).sum(axis=0)
+    return bool(size.min() < enough * size.max())
 
 
 def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
