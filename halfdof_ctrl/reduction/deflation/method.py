@@ -215,6 +215,7 @@ def _decision(model: SecondOrderModel, decision: BlockDecision) -> RankDecision:
         singular_values=decision.singular_values,
         rank=decision.rank,
         bound=decision.bound,
+        noise=decision.noise,
     )
 
 

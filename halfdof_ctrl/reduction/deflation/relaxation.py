@@ -20,13 +20,14 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.reduction.algebra.blocks import RANK_TOLERANCE
+from halfdof_ctrl.reduction.algebra.blocks import ENTRY_NOISE, RANK_TOLERANCE
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold
 from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks, structural_offsets
 from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, level_scaled
 
 ROW_PIVOT_SHARE = 0.9  #: of the largest pivot, from which on an earlier row is taken
 UNCLEAR_TIGHT_RANK = 100.0  #: singular values above the bound and below this times it may be either
+LARGEST_DEVIATION = 6.0  #: root mean square errors that a singular value may be off by rounding
 SHORTER_MULTIPLIER = 4.0  #: root mean square errors within which a shorter multiplier is as good
 FINEST_DYADIC = 10  #: multipliers within rounding of a multiple of 2^-10 are taken as that
 
@@ -39,6 +40,7 @@ class BlockDecision:
     singular_values: FloatArray
     rank: int
     bound: float  #: singular values up to this one counted as zero
+    noise: float  #: those up to this one may be what rounding of the entries makes of a zero
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -133,6 +135,10 @@ class _Block:
             singular_values=values,
             rank=int(np.count_nonzero(values > bound)),
             bound=bound,
+            noise=max(
+                ENTRY_NOISE * rows.size * float(values[0]),
+                LARGEST_DEVIATION * float(np.sqrt(rows.size * variance.sum(axis=1)).max()),
+            ),
         )
         return cls(
             rows=rows,

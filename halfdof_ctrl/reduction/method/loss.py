@@ -16,6 +16,7 @@ from typing import Protocol
 
 import numpy as np
 import scipy.linalg
+from scipy.linalg.lapack import dgetrf, zgetrf
 from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
@@ -127,11 +128,11 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
         poles, rounding = eigenvalues_and_rounding(A)
         return poles, rounding + AT_ORIGIN * np.abs(poles).max(initial=0.0)
     matrix, _ = balanced_states(A)
-    factors, shift = scipy.linalg.lu_factor(matrix, check_finite=False), 0.0
+    factors, shift = dgetrf(matrix)[:2], 0.0  # says nothing of free motions, which are looked after below
     pivots = np.abs(np.diag(factors[0]))
     if pivots.min() <= N * EPS * pivots.max():  # free motions: look beside zero
         shift = -BESIDE_ZERO * float(np.exp(np.log(np.maximum(pivots, EPS * pivots.max())).mean()))
-        factors = scipy.linalg.lu_factor(matrix - shift * np.eye(N), check_finite=False)
+        factors = dgetrf(matrix - shift * np.eye(N))[:2]
     inverse = LinearOperator(
         (N, N), matvec=lambda v: scipy.linalg.lu_solve(factors, v, check_finite=False), dtype=np.float64
     )
@@ -196,7 +197,7 @@ class StateSolver:
         self.onto = lower[:, N - k :] / self.rates.T
         reduced = lower[:, : N - k].copy()
         reduced[:, :k] += s * self.onto
-        self.factors = scipy.linalg.lu_factor(reduced, check_finite=False) if N else None
+        self.factors = zgetrf(reduced)[:2] if N else None
         if self.factors is not None and not np.abs(np.diag(self.factors[0])).min() > 0.0:
             msg = "s is an eigenvalue"
             raise np.linalg.LinAlgError(msg)

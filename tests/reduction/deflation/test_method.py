@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mechss
-from halfdof_ctrl.base.errors import SingularPencilError, UncertainRankError
+from halfdof_ctrl.base.errors import CloseDecisionWarning, SingularPencilError, UncertainRankError
 from halfdof_ctrl.reduction.deflation import method
 from halfdof_ctrl.reduction.deflation.method import CAUTIONS, deflated
 from halfdof_ctrl.reduction.deflation.row_system import Caution
@@ -241,3 +241,13 @@ def test_state_selection_without_states() -> None:
     selection = StateSelection(dofs=("a",), places=(), differentiations={})
     assert (selection.states, selection.static) == ((), ("a",))
     assert selection.state_maps()[0].shape == (0, 1)
+
+
+def test_zeros_that_stand_above_rounding_are_announced() -> None:
+    """A mass that is singular but for 4e-13, unsymmetric stiffness: four states, and a warning of two more."""
+    v = np.array([1.0, 1.0, -2.0])
+    M = np.array([[5.0, 3, 3], [3, 2, 1], [3, 1, 5]]) + 2.0**-39 * np.outer(v, v)
+    C = np.array([[0.0, -1, -3], [1, 0, 2], [3, -2, 0]])
+    K = np.array([[5.0, -4, -3], [0, 4, 5], [-7, -1, 5]])
+    with pytest.warns(CloseDecisionWarning, match="its next singular value, .* is taken as zero, though rounding"):
+        assert exact_reduction(mechss(M, C, K)).order == 4
