@@ -2,6 +2,8 @@
 
 from halfdof_ctrl.base.errors import (
     AssemblyError,
+    CheckpointError,
+    CheckpointWarning,
     CloseDecisionWarning,
     ComplexModelError,
     DataLimitWarning,
@@ -39,6 +41,8 @@ from halfdof_ctrl.base.errors import (
 
 __all__ = [
     "AssemblyError",
+    "CheckpointError",
+    "CheckpointWarning",
     "CloseDecisionWarning",
     "ComplexModelError",
     "DataLimitWarning",

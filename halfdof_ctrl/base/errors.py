@@ -237,6 +237,10 @@ class MissingExtraError(FileFormatError):
         self.extra = extra
 
 
+class CheckpointError(FileFormatError):
+    """A file cannot be used as the checkpoint of a sweep: it is none, is one of another sweep, or is in use."""
+
+
 class WorkerError(HalfdofError):
     """Worker processes cannot start or cannot load what they are to do; `function` is its name."""
 
@@ -324,6 +328,10 @@ class InaccurateGainWarning(HalfdofWarning):
 
 class FailedCasesWarning(HalfdofWarning):
     """Some cases of a sweep failed; its `failures` say which, and why."""
+
+
+class CheckpointWarning(HalfdofWarning):
+    """Finished cases of a sweep could not be written to its checkpoint; the result of the sweep has them."""
 
 
 class ImportedModelWarning(HalfdofWarning):

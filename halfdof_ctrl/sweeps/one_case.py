@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
+from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import Names, force_names, motion_names, name_from_label, unknown_name_error
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
@@ -50,6 +50,7 @@ class CaseError:
     kind: str  #: type of the exception
     message: str
     traceback: str  #: where it came from, as Python writes it
+    unknown: tuple[str, ...] = ()  #: names of asked signals that the system does not have
 
     @classmethod
     def of(cls, error: BaseException) -> "CaseError":
@@ -64,6 +65,10 @@ class CaseError:
         except Exception:  # noqa: BLE001  # as above, or a __cause__ of that kind
             text = "".join(traceback.format_tb(error.__traceback__)) + kind
         return cls(kind=kind, message=message, traceback=text)
+
+
+class _UnknownSignalsError(SignalNameError):
+    """Signals that were asked for, as against such as the user's function names."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -88,6 +93,8 @@ class CaseWork:
         for parameters in cases:
             try:
                 results.append(self.result_of(parameters))
+            except _UnknownSignalsError as error:
+                results.append(replace(CaseError.of(error.__cause__ or error), unknown=error.names))
             except (Exception, SystemExit) as error:  # noqa: BLE001  # whatever the user's function raises
                 results.append(CaseError.of(error))
         return results
@@ -98,7 +105,10 @@ class CaseWork:
         quantities = self.compute or self._usual(made)
         if not isinstance(made, System):
             return CaseResult(value=as_numbers(self._computed(made, quantities)))
-        made = selected(made, self.inputs, self.outputs)
+        try:
+            made = selected(made, self.inputs, self.outputs)
+        except SignalNameError as error:
+            raise _UnknownSignalsError(str(error), names=error.names) from error
         functions = [quantity for quantity in quantities if callable(quantity)]
         inputs, outputs = signals_of(made)
         return CaseResult(

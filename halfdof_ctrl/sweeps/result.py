@@ -55,6 +55,7 @@ class SweepResult:
         npt.NDArray[Any] | None
     )  #: (...) numbers or arrays that a function gave; NaN fills up where they differ in shape
     failures: tuple[SweepFailure, ...]  #: cases that failed, in order
+    ran: str = ""  #: where the cases were computed, and why there
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -77,6 +78,8 @@ class SweepResult:
             lines.append(f"values: {' x '.join(map(str, shape)) if shape else 'a number'} each")
         if self.failures:
             lines.append(f"failed: {len(self.failures)}, first {self.failures[0]}")
+        if "since" in self.ran or "checkpoint" in self.ran:  # what is not as it was asked for
+            lines.append(f"computed {self.ran}")
         return "\n  ".join(lines)
 
 

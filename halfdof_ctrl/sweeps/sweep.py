@@ -5,9 +5,13 @@ what another function makes of the model. Any `concurrent.futures.Executor` can 
 fails leaves NaN in the arrays and a named failure.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import functools
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy.typing as npt
@@ -18,16 +22,18 @@ from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.threads import available_cores
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.sweeps.cases import Parameters, listed_cases, require_accepted
-from halfdof_ctrl.sweeps.one_case import CaseError, CaseWork, Constant, FrequencyWork, Quantity, System, selected
-from halfdof_ctrl.sweeps.process_pool import Work
+from halfdof_ctrl.sweeps.cases import Parameters, in_words, listed_cases, name_of, require_accepted
+from halfdof_ctrl.sweeps.checkpoint import Checkpoint, open_checkpoint
+from halfdof_ctrl.sweeps.fingerprint import fingerprint
+from halfdof_ctrl.sweeps.ledger import Ledger, RefusedSignals
+from halfdof_ctrl.sweeps.one_case import CaseWork, Constant, FrequencyWork, Quantity
 from halfdof_ctrl.sweeps.result import Outcome, SweepResult, joined_cases, joined_frequencies
+from halfdof_ctrl.sweeps.waiting import Work
 from halfdof_ctrl.sweeps.workers import work_through
 from halfdof_ctrl.systems.frequency import checked_frequencies
 
 QUANTITIES = ("poles", "response")
 EVERY_CORE = -1  #: as many workers as cores
-NOT_RUN = CaseError(kind="NotRun", message="the sweep was interrupted before this case was done", traceback="")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,6 +44,14 @@ class _Plan:
     items: Sequence[Any]  #: what the work takes, one for each outcome
     what: str  #: the items are, in the plural
     join: Callable[[Sequence[Outcome]], SweepResult]
+    trusted: bool  #: the function is one of this package, which ends no process
+    facts: dict[str, object]  #: what makes it this sweep and no other
+    about: dict[str, object]  #: the same for people, in short
+
+    @property
+    def is_even(self) -> bool:
+        """Whether the items are frequencies of one system, which is made anew for each chunk."""
+        return self.what == "frequencies"
 
 
 def sweep(
@@ -51,6 +65,8 @@ def sweep(
     compute: Quantity | Sequence[Quantity] | None = None,
     workers: int | None = None,
     executor: Executor | None = None,
+    timeout: float | None = None,
+    checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | None = None,
 ) -> SweepResult:
     """Compute many cases of a model, or many frequencies of a large one.
@@ -79,6 +95,13 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Does the work instead: threads or processes, Dask (``Client(...).get_executor()``), mpi4py
         (``MPIPoolExecutor()``). It is left open.
+    timeout : float, optional
+        Seconds that one case (or one frequency) may take; then its process is ended, the case fails as a
+        ``TimeoutError``, and another process goes on with the others. Nothing can interrupt compiled code in this
+        process, so without `workers` one process is started, and an `executor` is refused.
+    checkpoint : path-like, optional
+        File to which finished cases are appended as they come. If it is there, the cases in it are not computed again:
+        the same call continues a sweep that was stopped in whatever way. Cases that failed are tried again.
     progress : bool, optional
         Show a bar, or never; by default on a terminal or in a notebook, after a second.
 
@@ -92,7 +115,11 @@ def sweep(
         Parameters that the function does not take, no values, a response without frequencies, and other requests
         without a meaning; all before anything is computed.
     SignalNameError
-        Inputs or outputs that the system of the first case does not have; it is made here to see.
+        Inputs or outputs that the system of the first case does not have; the other cases are not computed.
+    CheckpointError
+        The file of `checkpoint` is none, belongs to another sweep, or is in use by another run.
+    OSError
+        It cannot be written.
     WorkerError
         Processes that cannot start, or a function that cannot be sent to them.
     SweepInterruptedError
@@ -102,14 +129,20 @@ def sweep(
     -----
     FailedCasesWarning
         Some cases failed; they are in `SweepResult.failures`.
+    CheckpointWarning
+        The disk of the checkpoint became full or went away; the result is whole all the same.
 
     Notes
     -----
     Cases go to the workers in chunks of about a quarter of a second. If a process that was started here dies (out of
-    memory, crash in compiled code), others are started and what it was working on is done again; a case that kills
-    three of them alone fails. Dask does the same by its own rules. Any other executor that breaks takes no more work,
+    memory, crash in compiled code), another is started and what it was working on is done again; a case that kills
+    three of them fails. Dask does the same by its own rules. Any other executor that breaks takes no more work,
     and the rest of the cases fails with its error. Linear algebra in a worker uses as many threads as it has cores as
     its share, and a single one in an executor that was given.
+
+    A sweep that is too short for processes does without: as long as what is left would take less than a second, one
+    process does it, or this one if the function is of this package, which ends no process. `SweepResult.ran` says what
+    was done. Processes end with this one, however that ends.
 
     Examples
     --------
@@ -120,30 +153,54 @@ def sweep(
     [[1.0, -1.0], [2.0, -2.0]]
     """
     processes = _checked_workers(workers, executor)
+    if timeout is not None:
+        processes = _checked_timeout(timeout, processes, executor)
     plan = _planned(function, parameters, paired=paired, omega=omega, inputs=inputs, outputs=outputs, compute=compute)
-    outcomes: list[Outcome] = [NOT_RUN] * len(plan.items)
-    whole = plan.what == "frequencies"
-    here = processes is None and executor is None
+    ledger = Ledger(len(plan.items))
+    show = False if plan.is_even and processes is None and executor is None and checkpoint is None else progress
     try:
-        with progress_bar(len(plan.items), plan.what, show=False if whole and here else progress) as advance:
-
-            def store(number: int, outcome: Outcome | BaseException) -> None:
-                outcomes[number] = CaseError.of(outcome) if isinstance(outcome, BaseException) else outcome
-                advance(1)
-
-            work_through(plan.work, plan.items, store, executor=executor, workers=processes, even=whole)
+        with _checkpoint(checkpoint, plan) as file, progress_bar(len(plan.items), plan.what, show=show) as advance:
+            known = ledger.begin(file, advance)
+            ran = work_through(
+                plan.work,
+                [plan.items[number] for number in ledger.left],
+                ledger.store,
+                executor=executor,
+                workers=processes,
+                even=plan.is_even,
+                timeout=timeout,
+                prompt=file is not None,
+                trusted=plan.trusted,
+            )
     except KeyboardInterrupt as stop:
-        done = len(outcomes) - outcomes.count(NOT_RUN)
         msg = (
-            f"The sweep was interrupted after {done} of {len(outcomes)} {plan.what}. What is done is kept in this "
-            "exception: `except KeyboardInterrupt as stop: result = stop.result`, or sys.last_value.result afterwards."
+            f"The sweep was interrupted after {ledger.done} of {len(plan.items)} {plan.what}. What is done is kept in "
+            "this exception: `except KeyboardInterrupt as stop: result = stop.result`, or sys.last_value.result later."
         )
-        raise SweepInterruptedError(msg, result=plan.join(outcomes)) from stop
-    result = plan.join(outcomes)
+        raise SweepInterruptedError(msg, result=plan.join(ledger.outcomes)) from stop
+    except RefusedSignals as refused:
+        raise refused.in_words() from None
+    ledger.warn_of_lost_lines()
+    if known:
+        ran += f", {known} of {len(plan.items)} {plan.what} taken from the checkpoint"
+    result = replace(plan.join(ledger.outcomes), ran=ran)
     if result.failures:
-        msg = f"{len(result.failures)} of {len(outcomes)} {plan.what} failed, first {result.failures[0]}"
+        msg = f"{len(result.failures)} of {len(plan.items)} {plan.what} failed, first {result.failures[0]}"
         give_warning(msg, FailedCasesWarning)
     return result
+
+
+@contextmanager
+def _checkpoint(path: str | os.PathLike[str] | None, plan: _Plan) -> Iterator[Checkpoint | None]:
+    """Open the checkpoint, if there is one."""
+    if path is None:
+        yield None
+        return
+    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
+        msg = f"checkpoint must be the path of a file, not {path!r}."
+        raise ParameterError(msg, parameter="checkpoint", value=path)
+    with open_checkpoint(path, fingerprint(**plan.facts), plan.about) as file:
+        yield file
 
 
 def _planned(
@@ -173,8 +230,18 @@ def _planned(
         raise ParameterError(msg, parameter="function", value=function)
     cases = listed_cases(parameters, paired=paired)
     require_accepted(function, cases)
-    if len(cases) and (inputs is not None or outputs is not None):
-        _require_signals(function, cases.arguments(0), inputs, outputs)
+    trusted = _is_own(function) and not any(callable(quantity) for quantity in quantities)
+    facts = {
+        "function": function,
+        "items": [cases.arguments(number) for number in range(len(cases))],
+        "omega": frequencies,
+        "signals": [inputs, outputs],
+        "compute": quantities,
+    }
+    about: dict[str, object] = {
+        "function": name_of(function),
+        "parameters": in_words(cases.varied(0)) + ", ..." if cases.parameters else "no parameters",
+    }
     if parameters is None and frequencies is not None and quantities == ("response",):
         shared = FrequencyWork(function=function, inputs=inputs, outputs=outputs)
         return _Plan(
@@ -182,6 +249,9 @@ def _planned(
             items=frequencies.tolist(),
             what="frequencies",
             join=lambda outcomes: joined_frequencies(outcomes, frequencies),
+            trusted=trusted,
+            facts=facts,
+            about=about | {"cases": len(frequencies), "what": "frequencies"},
         )
     work = CaseWork(function=function, compute=quantities, omega=frequencies, inputs=inputs, outputs=outputs)
     return _Plan(
@@ -189,19 +259,17 @@ def _planned(
         items=[cases.arguments(number) for number in range(len(cases))],
         what="cases",
         join=lambda outcomes: joined_cases(outcomes, cases, frequencies),
+        trusted=trusted,
+        facts=facts,
+        about=about | {"cases": len(cases), "what": "cases"},
     )
 
 
-def _require_signals(
-    function: Callable[..., object], first: Mapping[str, object], inputs: Names, outputs: Names
-) -> None:
-    """Refuse names of signals at once that the first system does not have; what else fails is for its case to say."""
-    try:
-        made = function(**first)
-    except (Exception, SystemExit):  # noqa: BLE001  # whatever the user's function raises
-        return
-    if isinstance(made, System):
-        selected(made, inputs, outputs)
+def _is_own(function: object) -> bool:
+    """Tell a function of this package, which ends no process, from one of the user's."""
+    while isinstance(function, functools.partial):
+        function = function.func
+    return str(getattr(function, "__module__", "")).split(".")[0] == __name__.split(".")[0]
 
 
 def _checked_quantities(compute: object) -> tuple[Quantity, ...]:
@@ -236,3 +304,17 @@ def _checked_workers(workers: object, executor: object) -> int | None:
         msg = f"workers = {workers}, but it must be a positive number of processes, or -1 for one a core."
         raise ParameterError(msg, parameter="workers", value=workers)
     return available_cores() if workers == EVERY_CORE else workers
+
+
+def _checked_timeout(timeout: object, processes: int | None, executor: Executor | None) -> int:
+    """Read the time of a case; give the number of processes that can keep to it."""
+    if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0.0 < timeout < math.inf:
+        msg = f"timeout = {timeout!r}, but it must be a positive number of seconds."
+        raise ParameterError(msg, parameter="timeout", value=timeout)
+    if executor is not None:
+        msg = (
+            "timeout ends the process of a case, but those of an executor are not this sweep's to end. Give workers "
+            "instead of the executor, or set the time limit where the executor starts its workers."
+        )
+        raise ParameterError(msg, parameter="timeout", value=timeout)
+    return 1 if processes is None else processes

@@ -1,36 +1,23 @@
-"""Work on many items by the workers of an executor: in chunks, through crashes, and with their cores to themselves.
+"""Work on many items here, by the workers of an executor, or by processes that are started for it (see `crew`).
 
-Items are handed over in chunks that take about `CHUNK_SECONDS`, measured as the work goes on, so that short ones are
-not drowned by the way to the worker and back. A worker that dies loses nothing: what it may have been working on
-is done again alone, in halves, until either all is done or a single item has killed `ATTEMPTS` workers on its own.
+Items are handed over in chunks that take about a quarter of a second, measured as the work goes on, so that short ones
+are not drowned by the way to the worker and back. What an executor loses is done again piece by piece, where it takes
+more work.
 
 Linear algebra in a worker is held to its share of the cores (see `threads`).
 """
 
-import math
 import time
-from collections import deque
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from contextlib import suppress
-from typing import Any, TypeAlias
+from typing import Any
 
-from halfdof_ctrl.base.errors import WorkerError
 from halfdof_ctrl.base.progress import silence
 from halfdof_ctrl.base.threads import available_cores, limited_threads
-from halfdof_ctrl.sweeps.process_pool import ProcessPool, Work
+from halfdof_ctrl.sweeps.waiting import CHUNK_SECONDS, SHORT_SECONDS, Chunk, Store, Waiting, Work
 
-Store: TypeAlias = Callable[[int, Any], None]  #: takes the number of an item and its result or the error that it met
-Chunk: TypeAlias = list[int]  #: numbers of items
-CHUNK_SECONDS = 0.25  #: of work in a chunk
-SHARES = 2  #: chunks that a worker still gets at least, so that none has all that is left
-EVEN_SHARES = 4  #: chunks for each worker where all are cut at the beginning
-ATTEMPTS = 3  #: workers that an item may kill on its own before it is given up
 USUAL_WORKERS = 32  #: of an executor that does not say how many it has
-
-
-class LostWorkerError(RuntimeError):
-    """A worker process died each time that an item was given to it alone."""
+PIECES = 20  #: of even work that is done here and whose results are wanted as they come
 
 
 def work_through(
@@ -41,8 +28,11 @@ def work_through(
     executor: Executor | None,
     workers: int | None,
     even: bool = False,
-) -> None:
-    """Do all items and store their results as they come.
+    timeout: float | None = None,
+    prompt: bool = False,
+    trusted: bool = False,
+) -> str:
+    """Do all items and store their results as they come; say in words where they were done.
 
     Parameters
     ----------
@@ -57,6 +47,12 @@ def work_through(
         Without an executor: how many processes to start for it; None to work here.
     even : bool
         Cut the items into equal chunks instead of measuring: for work that takes its time once for each chunk.
+    timeout : float, optional
+        Seconds that an item may take in a process.
+    prompt : bool
+        Have results as soon as they are there.
+    trusted : bool
+        The work cannot end this process, so that it is tried here before processes are started for it.
 
     Raises
     ------
@@ -65,58 +61,47 @@ def work_through(
     """
     if executor is not None:
         _work_elsewhere(work, items, store, executor, even=even)
-    elif workers is not None:
-        _work_in_processes(work, items, store, workers, even=even)
-    else:
-        _work_here(work, items, store, even=even)
+        return "in the executor"
+    if workers is None:
+        if even:
+            _work_here_evenly(work, items, store, pieces=PIECES if prompt else 1)
+        else:
+            _work_here(work, items, store)
+        return "in this process"
+    done = 0
+    if trusted and not even and timeout is None:
+        with limited_threads(max(1, available_cores() // workers)):  # the same numbers wherever a case is done
+            done = _work_here(work, items, store, while_short=True)
+        if done == len(items):
+            return "in this process, since it was too short for others"
+
+    from halfdof_ctrl.sweeps.crew import work_in_processes  # noqa: PLC0415  # multiprocessing costs time to import
+
+    def store_rest(number: int, result: object) -> None:
+        store(done + number, result)
+
+    return work_in_processes(work, items[done:], store_rest, workers, even=even, timeout=timeout, prompt=prompt)
 
 
-def _work_here(work: Work, items: Sequence[Any], store: Store, *, even: bool) -> None:
-    if even:  # all at once, which shows its own progress
-        for number, result in enumerate(work(list(items))):
-            store(number, result)
-        return
+def _work_here(work: Work, items: Sequence[Any], store: Store, *, while_short: bool = False) -> int:
+    """Do items one by one, if asked only while they look too short for processes; give how many are done."""
+    begin = time.monotonic()
     for number, item in enumerate(items):
         with silence():
             (result,) = work([item])
         store(number, result)
+        spent, left = time.monotonic() - begin, len(items) - number - 1
+        if while_short and spent > CHUNK_SECONDS and spent / (number + 1) * left > SHORT_SECONDS:
+            return number + 1
+    return len(items)
 
 
-class _Waiting:
-    """The items that nobody works on yet."""
-
-    def __init__(self, count: int, workers: int, *, even: bool) -> None:
-        self._left = deque(range(count))
-        self._single: deque[int] = deque()  # of chunks that failed as a whole
-        self._workers = workers
-        self._size = math.ceil(count / (EVEN_SHARES * workers)) if even else None
-        self._seconds = self._done = 0.0
-
-    def __bool__(self) -> bool:
-        return bool(self._left or self._single)
-
-    def take(self) -> Chunk:
-        """Return the next chunk: a single item as long as nobody knows how long one takes."""
-        if not self._left:
-            return [self._single.popleft()]
-        size = self._size
-        if size is None:
-            share = math.ceil(len(self._left) / (SHARES * self._workers))
-            size = min(share, int(CHUNK_SECONDS * self._done / max(self._seconds, 1e-9)))
-        return [self._left.popleft() for _ in range(min(max(size, 1), len(self._left)))]
-
-    def took(self, chunk: Chunk, seconds: float) -> None:
-        """Remember how long a chunk took."""
-        self._seconds += seconds
-        self._done += len(chunk)
-
-    def put_back(self, chunk: Chunk) -> None:
-        """Return back what could not be handed over."""
-        self._left.extendleft(reversed(chunk))
-
-    def split(self, chunk: Chunk) -> None:
-        """Have the items of a chunk done one by one, after the others."""
-        self._single.extend(chunk)
+def _work_here_evenly(work: Work, items: Sequence[Any], store: Store, *, pieces: int) -> None:
+    """Do items in a few pieces, each of which shows its own progress."""
+    size = -(-len(items) // pieces) or 1
+    for first in range(0, len(items), size):
+        for number, result in enumerate(work(list(items[first : first + size])), start=first):
+            store(number, result)
 
 
 class _Round:
@@ -138,7 +123,7 @@ class _Round:
         items = [self._items[number] for number in chunk]
         self.running[executor.submit(run_chunk, self._work, items, self._threads)] = chunk
 
-    def run(self, executor: Executor, waiting: _Waiting, most: int) -> list[Chunk]:
+    def run(self, executor: Executor, waiting: Waiting, most: int) -> list[Chunk]:
         """Keep up to so many chunks on their way until all is done; give those that a broken executor has lost."""
         while waiting or self.running:
             while waiting and len(self.running) < most:
@@ -153,7 +138,7 @@ class _Round:
                 return lost + self.collect(wait(self.running).done, waiting)
         return []
 
-    def collect(self, done: Iterable[Future[Any]], waiting: _Waiting) -> list[Chunk]:
+    def collect(self, done: Iterable[Future[Any]], waiting: Waiting) -> list[Chunk]:
         """Store what has come back; give the chunks that were lost with their worker."""
         lost = []
         for future in done:
@@ -197,7 +182,7 @@ def run_chunk(work: Work, items: list[Any], threads: int) -> tuple[list[Any], fl
 def _work_elsewhere(work: Work, items: Sequence[Any], store: Store, executor: Executor, *, even: bool) -> None:
     """Use an executor that was given: when it takes no more work, what is left fails with its error."""
     workers = _workers_of(executor)
-    waiting, current = _Waiting(len(items), workers, even=even), _Round(work, items, store, threads=1)
+    waiting, current = Waiting(len(items), workers, even=even), _Round(work, items, store, threads=1)
     try:
         if current.run(executor, waiting, most=2 * workers) or waiting:
             msg = "the executor broke: one of its workers died, and it takes no more work"
@@ -219,48 +204,6 @@ def _workers_of(executor: Executor) -> int:
     if client is not None:
         said.append(max(sum(client.ncores().values()), USUAL_WORKERS))
     return max([number for number in said if isinstance(number, int) and number > 0], default=USUAL_WORKERS)
-
-
-def _work_in_processes(work: Work, items: Sequence[Any], store: Store, workers: int, *, even: bool) -> None:
-    """Start processes for the work, and others for those that die."""
-    workers = min(workers, len(items))
-    current = _Round(work, items, store, threads=max(1, available_cores() // workers))
-    waiting = _Waiting(len(items), workers, even=even)
-    pool = ProcessPool(work, workers)
-    try:
-        while waiting:
-            suspects = deque(current.run(pool.executor, waiting, most=workers))
-            if suspects or waiting:
-                pool.restart()
-            while suspects:
-                suspects.extendleft(_alone(pool, current, waiting, suspects.popleft()))
-        pool.executor.shutdown()
-    except WorkerError as error:  # a machine that starts no more processes, for example
-        current.give_up(error)
-    except BaseException:
-        current.cancel()
-        raise
-    finally:
-        pool.stop()
-
-
-def _alone(pool: "ProcessPool", current: _Round, waiting: _Waiting, chunk: Chunk) -> list[Chunk]:
-    """Do a chunk with nothing beside it; if its worker dies, give its halves, or fail the single item."""
-    for _ in range(ATTEMPTS if len(chunk) == 1 else 1):
-        with suppress(BrokenExecutor):  # a process that died with nothing to do counts like one that died at work
-            current.submit(pool.executor, chunk)
-            if not current.collect(wait(current.running).done, waiting):
-                return []
-        pool.restart()
-    if len(chunk) == 1:
-        msg = (
-            f"the worker process died {ATTEMPTS} times, each time with this case alone at work in it: it crashed in "
-            "compiled code, was out of memory, or was ended from outside. Run the case without workers to see where."
-        )
-        current.store(chunk, [LostWorkerError(msg)])
-        return []
-    middle = len(chunk) // 2
-    return [chunk[middle:], chunk[:middle]]  # as extendleft takes them
 
 
 def _error_of(future: Future[Any]) -> BaseException | None:

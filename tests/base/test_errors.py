@@ -9,6 +9,7 @@ import pytest
 from halfdof_ctrl.base import errors
 from halfdof_ctrl.base.errors import (
     AssemblyError,
+    CheckpointError,
     CloseDecisionWarning,
     ComplexModelError,
     EnergyFormError,
@@ -54,6 +55,7 @@ EXAMPLES: list[HalfdofError] = [
     StabilizationError("unstable", eigenvalue=1 + 2j, quantity="a"),
     FileFormatError("truncated", path="model.mtx", line=3),
     MissingExtraError("needs h5py", path="model.mat", extra="hdf5"),
+    CheckpointError("of another sweep", path="sweep.jsonl"),
     WorkerError("cannot start", function="hydromount"),
     EnergyFormError("no energy coordinates", reason="unsymmetric", dofs=("a",)),
     ModelSizeError("too many states", size=400_000, limit=8192),

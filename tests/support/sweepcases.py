@@ -79,3 +79,30 @@ def wait_a_little(x: int, seconds: float, folder: str) -> int:
 def mount_over_damping(C_h: float) -> SecondOrderModel:
     """Give the hydromount without oil flow as another model, with fewer states."""
     return hydromount(C_h=C_h)
+
+
+def mount(C_h: float, K_v: float = 500.0) -> SecondOrderModel:
+    """Give the hydromount by a function that is not one of the package."""
+    return hydromount(C_h=C_h, K_v=K_v)
+
+
+def marked_square(x: int, folder: str, seconds: float = 0.0) -> int:
+    """Square a number and leave a mark each time, with the number of the process, before and after."""
+    attempt = sum(path.name.startswith(f"begun-{x}-") for path in Path(folder).iterdir())
+    (Path(folder) / f"begun-{x}-{attempt}-{os.getpid()}").touch()
+    time.sleep(seconds)
+    (Path(folder) / f"done-{x}-{attempt}-{os.getpid()}").touch()
+    return x * x
+
+
+def endless_at(x: int, endless: int) -> int:
+    """Square a number, but never come to an end at one, in compiled code that lets no thread run."""
+    return sum(range(10**15)) if x == endless else x * x
+
+
+def patient_at(x: int, endless: int, folder: str) -> int:
+    """Square a number, but wait at one until somebody ends this process."""
+    (Path(folder) / f"begun-{x}-{os.getpid()}").touch()
+    if x == endless:
+        time.sleep(3600.0)
+    return x * x

@@ -22,9 +22,12 @@ from numpy.testing import assert_array_equal
 from halfdof_ctrl import hydromount, sweep
 from halfdof_ctrl.base.errors import FailedCasesWarning, SweepInterruptedError, WorkerError
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.sweeps import crew
+from halfdof_ctrl.sweeps.crew import ATTEMPTS
 from halfdof_ctrl.sweeps.one_case import CaseError
-from halfdof_ctrl.sweeps.process_pool import ProcessPool
-from halfdof_ctrl.sweeps.workers import ATTEMPTS, CHUNK_SECONDS, _Waiting, work_through
+from halfdof_ctrl.sweeps.process_pool import WorkerProcess
+from halfdof_ctrl.sweeps.waiting import CHUNK_SECONDS, Waiting, Work
+from halfdof_ctrl.sweeps.workers import work_through
 from support import sweepcases
 
 COUNT = 40
@@ -73,12 +76,12 @@ def squares(items: list[int]) -> list[int]:
 
 
 def test_processes_give_what_this_process_gives() -> None:
-    """The same numbers to the last bit, from more than one process, none of them this one."""
+    """The same numbers to the last bit, from processes none of which is this one."""
     asked: dict[str, Any] = {"C_h": [100.0, 300.0], "K_v": np.linspace(100.0, 900.0, 10)}
     omega = np.geomspace(1.0, 50.0, 20)
     with limited_threads(1):
         here = sweep(hydromount, asked, omega=omega, inputs="F_y", outputs="y")
-    there = sweep(hydromount, asked, omega=omega, inputs="F_y", outputs="y", workers=2)
+    there = sweep(sweepcases.mount, asked, omega=omega, inputs="F_y", outputs="y", workers=2)
     assert_array_equal(np.asarray(there.response), np.asarray(here.response))
     assert_array_equal(np.asarray(there.poles), np.asarray(here.poles))
     processes = set(np.asarray(sweep(sweepcases.process, {"x": range(4)}, workers=2).values).tolist())
@@ -106,13 +109,16 @@ def test_a_case_that_ends_each_process_fails_alone() -> None:
 
 def test_a_machine_that_starts_no_more_processes_keeps_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rest fails with that reason."""
+    started: list[WorkerProcess] = []
 
-    def refuse(pool: ProcessPool) -> None:
-        pool.stop()
-        msg = "no more processes"
-        raise WorkerError(msg, function="end_process")
+    def only_once(work: Work, payload: bytes) -> WorkerProcess:
+        if started:
+            msg = "no more processes"
+            raise WorkerError(msg, function="end_process")
+        started.append(WorkerProcess(work, payload))
+        return started[0]
 
-    monkeypatch.setattr(ProcessPool, "restart", refuse)
+    monkeypatch.setattr(crew, "WorkerProcess", only_once)
     with pytest.warns(FailedCasesWarning, match="WorkerError: no more processes"):
         result = sweep(sweepcases.end_process, {"x": range(COUNT), "fatal": 7}, workers=1)
     assert_array_equal(np.asarray(result.values)[:1], [0])
@@ -250,7 +256,7 @@ def test_ctrl_c_takes_back_what_an_executor_has_not_begun() -> None:
 )
 def test_chunks_contain_every_item_once_and_none_is_long(count: int, workers: int, even: bool, seconds: float) -> None:  # noqa: FBT001
     """Whatever the time that an item takes; one that takes long is alone in its chunk."""
-    waiting, seen = _Waiting(count, workers, even=even), list[int]()
+    waiting, seen = Waiting(count, workers, even=even), list[int]()
     while waiting:
         chunk = waiting.take()
         waiting.took(chunk, seconds * len(chunk))
@@ -261,7 +267,7 @@ def test_chunks_contain_every_item_once_and_none_is_long(count: int, workers: in
 
 def test_short_items_travel_together() -> None:
     """A thousand items of a microsecond take a few dozen chunks, not a thousand."""
-    waiting, chunks = _Waiting(1000, 2, even=False), 0
+    waiting, chunks = Waiting(1000, 2, even=False), 0
     while waiting:
         chunk = waiting.take()
         waiting.took(chunk, 1e-6 * len(chunk))
@@ -271,7 +277,7 @@ def test_short_items_travel_together() -> None:
 
 def test_even_chunks_are_a_few_for_each_worker() -> None:
     """Work that takes its time once a chunk is cut at the beginning."""
-    waiting = _Waiting(800, 2, even=True)
+    waiting = Waiting(800, 2, even=True)
     assert [len(waiting.take()) for _ in range(8)] == [100] * 8
     assert not waiting
 
