@@ -4,13 +4,12 @@ from typing import Any, cast
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import SingularPencilError
 from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
-from halfdof_ctrl.base.sparse_factors import PIVOTINGS
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.exact_counts import normal_rank
 from halfdof_ctrl.descriptor.finite_part import GENERIC_POINTS
@@ -59,7 +58,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
     except RuntimeError:  # exactly singular
         matrix, _, _ = pencil.scaled_at(s)
         nudge = diags_array(PENCIL_NUDGE * np.random.default_rng(0).uniform(1.0, 2.0, matrix.shape[0]))
-        lu, known = splu(csc_array(matrix + nudge)), 0.0
+        lu, known = sparse_lu(csc_array(matrix + nudge)), 0.0
     generator = np.random.default_rng(0)
     vector = generator.standard_normal(matrix.shape[0]) + 1j * generator.standard_normal(matrix.shape[0])
     length = 1.0

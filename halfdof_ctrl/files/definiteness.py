@@ -16,9 +16,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, diags_array, eye_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 
 ZERO_VALUE = 1e-12  #: of the matrix with unit diagonal
 DENSE_SIZE = 100  #: up to which a component is solved densely
@@ -150,7 +150,7 @@ def _by_pivots(part: csc_array, zero: float) -> npt.NDArray[np.int64] | None:
 
 def _negative_pivots(shifted: csc_array) -> int | None:
     try:
-        factors = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = sparse_lu(shifted, *PIVOTINGS[0])
     except RuntimeError:  # exactly singular
         return None
     if not np.array_equal(factors.perm_r, factors.perm_c):

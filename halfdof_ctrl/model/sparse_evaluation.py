@@ -16,14 +16,14 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse.linalg import SuperLU
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, largest_by_row_and_column
-from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE, PIVOTINGS, SYMMETRIC_SHARE, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.quadratics import Coefficients
@@ -255,8 +255,7 @@ class PointFactors:
             It is exactly singular.
         """
         P, down, across = pencil.scaled_at(s)
-        symmetric = threshold < 1.0
-        lu = splu(P, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
+        lu = sparse_lu(P, ordering, threshold)
         return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
 
     def solve(self, right: Matrix) -> tuple[ComplexArray, float]:

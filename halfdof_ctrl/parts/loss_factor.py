@@ -21,13 +21,13 @@ from typing import Any, Literal, TypeAlias, cast, get_args
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array, diags_array, kron
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix, read_only
 from halfdof_ctrl.base.doors import answer_of, is_choice, is_real_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
+from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -267,9 +267,9 @@ def _largest_ratio(K: SparseMatrix, L: SparseMatrix, d: FloatArray) -> tuple[flo
     """Give the largest eigenvalue of ``K'' v = lambda K v``, with K'' = L diag(d) L^T, and its vector."""
     spread = L.toarray() * np.sqrt(d)
     try:
-        factors = splu(K)
+        factors = sparse_lu(K)
     except RuntimeError:  # exactly singular: a structure that floats
-        factors = splu(csc_array(K + SHIFT * diags_array(np.abs(K.diagonal()))))
+        factors = sparse_lu(csc_array(K + SHIFT * diags_array(np.abs(K.diagonal()))))
     solved = factors.solve(spread)
     inner = spread.T @ solved
     values, vectors = scipy.linalg.eigh((inner + inner.T) / 2.0)

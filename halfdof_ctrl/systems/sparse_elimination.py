@@ -11,9 +11,9 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.sparse_factors import sparse_lu
 
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Row: TypeAlias = dict[int, complex | ComplexArray]  #: entries of a matrix row by column, one or all points
@@ -44,14 +44,14 @@ def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: Complex
         return csc_array((entries + s * diagonal, present.indices, present.indptr), shape=A.shape)
 
     try:
-        factors = splu(shifted(points[points.size // 2]))
+        factors = sparse_lu(shifted(points[points.size // 2]))
         if factors.nnz <= SPARSE_FACTORS * A.shape[0]:
             values = _side_by_side(A, b, c, points, (factors.perm_r, factors.perm_c))
     except RuntimeError:  # a pole: every point is looked at by itself
         pass
     for k in np.flatnonzero(np.isnan(values)).tolist():
         try:
-            values[k] = c @ splu(shifted(points[k])).solve(b.astype(np.complex128))
+            values[k] = c @ sparse_lu(shifted(points[k])).solve(b.astype(np.complex128))
         except RuntimeError:
             values[k] = complex(np.inf, np.nan)
     return values

@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import csc_array, diags_array
-from scipy.sparse.linalg import LinearOperator, onenormest, splu
+from scipy.sparse.linalg import LinearOperator, onenormest
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
-from halfdof_ctrl.base.sparse_factors import PIVOTINGS, SYMMETRIC_SHARE
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, SYMMETRIC_SHARE, sparse_lu
 from halfdof_ctrl.base.sparse_products import exact_residual, times
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, Scaling, log_scaling, max_scaling
@@ -107,7 +107,7 @@ class SparseLU:
         """
         generator = np.random.default_rng(0)
         nudge = diags_array(NUDGE * generator.uniform(1.0, 2.0, self.rows.size))
-        factors = _attempt(csc_array(self.scaled.T + nudge), *PIVOTINGS[-1])
+        factors = sparse_lu(csc_array(self.scaled.T + nudge), *PIVOTINGS[-1])
         vector = generator.standard_normal(self.rows.size)
         for _ in range(NULL_STEPS):
             vector = factors.solve(vector)
@@ -145,7 +145,7 @@ def _factorized(matrix: SparseMatrix) -> tuple[Any, bool]:
     size = csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)
     for ordering, threshold in PIVOTINGS if is_nearly_symmetric(matrix) else PIVOTINGS[-1:]:
         try:
-            factors = _attempt(matrix, ordering, threshold)
+            factors = sparse_lu(matrix, ordering, threshold)
         except RuntimeError:  # a column vanishes
             return None, False
         solution = factors.solve(test)
@@ -154,11 +154,6 @@ def _factorized(matrix: SparseMatrix) -> tuple[Any, bool]:
         if error <= UNSAFE:
             return factors, error > REFINED
     return factors, True
-
-
-def _attempt(matrix: SparseMatrix, ordering: Any, threshold: float) -> Any:  # noqa: ANN401  # SuperLU has no public type
-    symmetric = threshold < 1.0
-    return splu(matrix, permc_spec=ordering, diag_pivot_thresh=threshold, options={"SymmetricMode": symmetric})
 
 
 def _reciprocal_condition(scaled: SparseMatrix, factors: Any) -> float:  # noqa: ANN401  # SuperLU has no public type

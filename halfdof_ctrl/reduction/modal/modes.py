@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
-from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME
+from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.modal.slices import MOST, modes_by_slices
@@ -96,7 +96,7 @@ def count_below(stiffness: ShiftedStiffness, omega: float) -> int:
     Elimination with pivots on the diagonal gives D without L having to be symmetric.
     """
     shifted = csc_array(stiffness.K - omega**2 * stiffness.M)
-    factors = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factors = sparse_lu(shifted, *PIVOTINGS[0])
     return int(np.count_nonzero(factors.U.diagonal() < 0.0))
 
 

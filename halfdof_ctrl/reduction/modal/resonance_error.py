@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked: errors grow towards its end
@@ -127,7 +127,7 @@ def _improved(
     s = complex(poles.mean())
     if abs(s.real) < UNDAMPED_POLE * abs(s):
         s *= 1.0 + POLE_ASIDE * 1j
-    factors = splu(csc_array(K + s * C + s**2 * M))
+    factors = sparse_lu(csc_array(K + s * C + s**2 * M))
     right = C @ shapes + 2.0 * (M @ shapes) * poles
     w = factors.solve(np.asfortranarray(right, dtype=np.complex128))
     w = w / np.abs(w).max(axis=0)

@@ -8,11 +8,12 @@ J. G. Lewis and H. D. Simon, A shifted block Lanczos algorithm, 1994).
 
 import numpy as np
 from scipy.sparse import csc_array
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh, splu
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
 
 MOST = 60  #: modes of a slice
@@ -137,7 +138,7 @@ def _cut(K: SparseMatrix, M: SparseMatrix, ends: tuple[float, int, float, int]) 
 def _inertia(K: SparseMatrix, M: SparseMatrix, sigma: float) -> tuple[int, float]:
     """Count negative pivots of ``K - sigma M``, and how much its elimination without interchanges grows."""
     shifted = csc_array(K - sigma * M)
-    factors = splu(shifted, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    factors = sparse_lu(shifted, *PIVOTINGS[0])
     if (factors.perm_r != factors.perm_c).any():  # rows were interchanged, and pivots are no longer those of D
         return 0, np.inf
     growth = float(np.abs(factors.U.data).max(initial=0.0)) / (float(np.abs(shifted.data).max(initial=0.0)) or 1.0)
@@ -150,7 +151,7 @@ def _in_slice(
     """Find the modes of a slice; None where it does not give as many as it must hold."""
     n = K.shape[0]
     sigma = ends[0] + (0.5 + OFFSET) * (ends[1] - ends[0])
-    factors = splu(csc_array(K - sigma * M))
+    factors = sparse_lu(csc_array(K - sigma * M))
     inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
     for attempt in range(1, TRIES + 1):
         k = min(count + SPARE * attempt, n - 1)

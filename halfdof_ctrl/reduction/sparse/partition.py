@@ -18,12 +18,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 from halfdof_ctrl.base.errors import ModelSizeError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, column_of_entries, sparse_unit
+from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.reduction.algebra.blocks import CANCELLATION, mixture_names
 from halfdof_ctrl.reduction.method.evidence import LightMasses, RankDecision
 
@@ -180,7 +180,7 @@ class SparsePartition:
         """Return ``p = T^-1 q`` for an (n, k) array."""
         if self.columns is None:
             return np.asarray(displacements[self.order])
-        return np.asarray(splu(self.columns).solve(displacements)[self.order])
+        return np.asarray(sparse_lu(self.columns).solve(displacements)[self.order])
 
 
 def cancelled(matrix: SparseMatrix, columns: SparseMatrix, sizes: SparseMatrix) -> SparseMatrix:
