@@ -10,15 +10,17 @@ from typing import TypeAlias, TypedDict
 
 import numpy as np
 
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
 from halfdof_ctrl.base.errors import (
     FileFormatError,
     HalfdofError,
     LostStateWarning,
     ParameterError,
+    SelectedSignalsWarning,
     give_warning,
     recording_warnings,
 )
-from halfdof_ctrl.base.names import listed, motions
+from halfdof_ctrl.base.names import force_names, listed, motions
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
@@ -28,6 +30,8 @@ from halfdof_ctrl.files.models import inspect_files, load_model
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
 from halfdof_ctrl.files.writing import replacing
+from halfdof_ctrl.model.dense_copy import small_dense
+from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.law_text import element_from_text
 from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -69,6 +73,7 @@ BUILT_IN_SIGNALS: dict[str, _Signals] = {
 }  #: what is shown unless the user asks for others
 BUILT_IN_ALONE = {"hydromount": {"m": 0.0}}  #: parameters of the part without what it carries, whose stiffness is meant
 BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
+CHOSEN_SIGNALS = 3  #: inputs, and outputs, of a large model for which none are given
 LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
 WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
@@ -98,12 +103,13 @@ def run_info(arguments: argparse.Namespace) -> int:
         return DONE
     model = given
     print(model)
-    if len(model.dofs) > LARGEST_PENCIL:
-        if not model.is_sparse:
-            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
-            return DONE
-        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
+    if len(model.dofs) > LARGEST_PENCIL and not model.is_sparse:
+        print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+        return DONE
+    if model.is_sparse:
         model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
+    if small_dense(model, LARGEST_PENCIL) is None:
+        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs with mass, damping or a signal.")
     else:
         structure = pencil_structure(model)
         kind = "regular" if structure.is_regular else "SINGULAR"
@@ -188,7 +194,7 @@ def run_step(arguments: argparse.Namespace) -> int:
     given = _given_model(arguments)
     if isinstance(given, NonlinearModel):
         return _nonlinear_step(given, arguments, kind)
-    model = given
+    model = _with_few_signals(given, arguments)
     if kind in TABLE_ENDINGS:
         with np.errstate(over="ignore", invalid="ignore"):  # which is refused below
             response = step_response(_with_recovered(model), arguments.time)
@@ -263,7 +269,29 @@ def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: 
 def _model(arguments: argparse.Namespace) -> SecondOrderModel:
     """Return the model of a command that works on linear ones: of a nonlinear one, the tangent at rest."""
     model = _given_model(arguments)
-    return model.tangent() if isinstance(model, NonlinearModel) else model
+    return _with_few_signals(model.tangent() if isinstance(model, NonlinearModel) else model, arguments)
+
+
+def _with_few_signals(model: SecondOrderModel, arguments: argparse.Namespace) -> SecondOrderModel:
+    """Choose signals of a large sparse model that has one for each DOF, of which nobody said which ones matter."""
+    inputs, outputs = model.inputs, model.outputs
+    if not model.is_sparse or max(len(inputs), len(outputs)) <= LARGEST_DENSE_COPY:
+        return model
+    heavy, _ = null_column_kinds(model.M, model.C)
+    dofs = [model.dofs[k] for k in np.flatnonzero(heavy).tolist()]
+    chosen: dict[str, list[str]] = {}
+    for kind, names, wanted in (("inputs", inputs, force_names(tuple(dofs))), ("outputs", outputs, tuple(dofs))):
+        if len(names) > LARGEST_DENSE_COPY and getattr(arguments, kind) is None:
+            known = set(names)
+            chosen[kind] = [name for name in wanted if name in known][:CHOSEN_SIGNALS] or list(names[:CHOSEN_SIGNALS])
+    if chosen:
+        words = " and ".join(f"the {kind} {', '.join(names)}" for kind, names in chosen.items())
+        msg = (
+            f"The model has {len(inputs)} inputs and {len(outputs)} outputs, too many for this command, which takes "
+            f"{words}. Choose others by {' and '.join(f'--{kind}' for kind in chosen)}."
+        )
+        give_warning(msg, SelectedSignalsWarning)
+    return model.select(chosen.get("inputs"), chosen.get("outputs"))
 
 
 def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearModel:

@@ -95,16 +95,19 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     ...     write_report(hydromount().select("F_y", "y"), f"{parent}/report").passed
     True
     """
-    model = dense_copy(
-        checked_model(model, "write_report"),
-        "write_report",
-        "Report a reduced model: write_report(truncate_modes(...), folder).",
-    )
+    n = len(checked_model(model, "write_report").dofs)
+    model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
     with recording_warnings() as caught:
         findings = _found(model)
         shown, cut = _shown(model)
+        if len(model.dofs) < n:
+            cut.append(
+                f"The model has {n} DOFs, of which {n - len(model.dofs)} static ones, that no input or output is "
+                "about, were condensed before; that changes neither eigenvalues nor transfer function. Each stands for "
+                "two infinite eigenvalues that are not counted here."
+            )
         plots = _plots(model, shown, findings.feedback)
     for message, category in dict(caught).items():
         give_warning(message, category)

@@ -334,6 +334,10 @@ class CheckpointWarning(HalfdofWarning):
     """Finished cases of a sweep could not be written to its checkpoint; the result of the sweep has them."""
 
 
+class SelectedSignalsWarning(HalfdofWarning):
+    """A command chose some inputs and outputs of a model that has too many for it."""
+
+
 class ImportedModelWarning(HalfdofWarning):
     """What a finite-element program wrote is read as it stands, but is probably not what was meant."""
 

@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 
 from halfdof_ctrl.base.arrays import EPS
 
-Ordering: TypeAlias = Literal["MMD_AT_PLUS_A", "COLAMD"]
+Ordering: TypeAlias = Literal["MMD_AT_PLUS_A", "COLAMD", "NATURAL"]
 Pivoting: TypeAlias = tuple[Ordering, float]  #: order, least pivot over the column's largest
 
 PIVOTINGS: tuple[Pivoting, ...] = (("MMD_AT_PLUS_A", 0.0), ("MMD_AT_PLUS_A", 0.1), ("COLAMD", 1.0))
@@ -28,7 +28,7 @@ def sparse_lu(matrix: csc_array, ordering: Ordering = "COLAMD", threshold: float
     Parameters
     ----------
     matrix : (n, n) csc_array
-    ordering : {'COLAMD', 'MMD_AT_PLUS_A'}
+    ordering : {'COLAMD', 'MMD_AT_PLUS_A', 'NATURAL'}
     threshold : float
         Least pivot over the largest entry of its column; below one, pivots on the diagonal are preferred.
 

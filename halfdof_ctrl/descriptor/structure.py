@@ -14,7 +14,7 @@ from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
 from halfdof_ctrl.descriptor.found_structure import found_structure
 from halfdof_ctrl.descriptor.growth import improper_pairs
-from halfdof_ctrl.model.dense_copy import dense_copy
+from halfdof_ctrl.model.dense_copy import dense_copy, with_few_signals
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -121,12 +121,10 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     >>> structure.improper_pairs
     (('F_q2', 'q2', 2),)
     """
-    model = dense_copy(
-        checked_model(model, "pencil_structure"),
-        "pencil_structure",
-        "The poles of mech2ss(model) are the finite eigenvalues.",
-    )
-    found = found_structure(model.quadratics.P)
+    n = len(checked_model(model, "pencil_structure").dofs)
+    few = with_few_signals(model)
+    small = dense_copy(few, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
+    found = found_structure(small.quadratics.P)
     order = order_by_size(found.values)
     if found.close:
         of_count = next(doubt for doubt in found.doubts if "above rounding" in doubt)
@@ -138,9 +136,9 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
         most_index=found.most_index,
         most_finite=found.most,
         fewest_finite=found.values.size - found.close,
-        n_infinite=2 * len(model.dofs) - found.values.size,
-        infinite_blocks=found.blocks,
+        n_infinite=2 * n - found.values.size,
+        infinite_blocks=(*found.blocks, *(1,) * (n - len(small.dofs))),  # of static DOFs that were condensed
         is_regular=found.is_regular,
         uncertainty=found.doubts,
-        model=model,
+        model=small if few is model else model,
     )

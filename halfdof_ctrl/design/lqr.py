@@ -217,9 +217,9 @@ def lqr(
     if not is_choice(method, get_args(Solver)):
         msg = f"method must be one of {listed(get_args(Solver))}, not {shown(method)}."
         raise ParameterError(msg, parameter="method", value=method)
-    model = dense_copy(
-        checked_model(model, "lqr"), "lqr", "Weigh the states yourself: control.lqr(mech2ss(model), Q, R)."
-    )
+    named = [dof for weights in physical.values() if isinstance(weights, Mapping) for dof in weights]
+    remedy = "Weigh the states yourself: control.lqr(mech2ss(model), Q, R)."
+    model = dense_copy(checked_model(model, "lqr"), "lqr", remedy, keep=list(map(str, named)))
     reduction = exact_reduction(model)
     if reduction.order == 0:
         msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."

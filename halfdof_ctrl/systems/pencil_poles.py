@@ -12,6 +12,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, DenseMatrix, FloatArray, powers_of_two
 from halfdof_ctrl.descriptor.structure import pencil_structure
+from halfdof_ctrl.model.dense_copy import dense_copy, with_few_signals
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, BoundedPoles, bounded_poles
@@ -20,17 +21,18 @@ STEPS = 3  #: of Newton's method
 
 
 def pencil_poles(model: SecondOrderModel) -> BoundedPoles:
-    """Find the finite eigenvalues of a dense model, those that are not told from zero exactly zero.
+    """Find the finite eigenvalues of a model, those that are not told from zero exactly zero.
 
     Parameters
     ----------
     model : SecondOrderModel
-        Dense; real or complex, of any index.
+        Real or complex, of any index.
 
     Returns
     -------
     BoundedPoles
     """
+    model = dense_copy(with_few_signals(model), "The search for poles", "Give the frequencies.")
     form = energy_system(model)
     if form is not None:
         return bounded_poles(form.A)
