@@ -21,6 +21,7 @@ from halfdof_ctrl.base.errors import (
     recording_warnings,
 )
 from halfdof_ctrl.base.names import force_names, listed, motions
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.design.lqr import StateFeedback, lqr
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
@@ -54,6 +55,7 @@ from halfdof_ctrl.systems.frequency import (
     has_many_states,
     model_frequencies,
 )
+from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.state_space import mech2ss, system_of_model
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.stiffness import (
@@ -63,7 +65,7 @@ from halfdof_ctrl.systems.stiffness import (
     transmissibility_response,
 )
 from halfdof_ctrl.systems.time_response import step_response
-from halfdof_ctrl.systems.working_states import working_system
+from halfdof_ctrl.systems.working_states import working_matrix, working_system
 
 DONE, CHECK_FAILED, REFUSED = 0, 1, 2
 _Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
@@ -73,6 +75,7 @@ BUILT_IN_SIGNALS: dict[str, _Signals] = {
 }  #: what is shown unless the user asks for others
 BUILT_IN_ALONE = {"hydromount": {"m": 0.0}}  #: parameters of the part without what it carries, whose stiffness is meant
 BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
+SURE = 10.0  #: bounds by which the real part of a pole exceeds zero where it is called unstable
 CHOSEN_SIGNALS = 3  #: inputs, and outputs, of a large model for which none are given
 LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
@@ -120,10 +123,24 @@ def run_info(arguments: argparse.Namespace) -> int:
             zeros = int(np.count_nonzero(np.linalg.eigvals(form.A) == 0.0))
             print(f"Free motions: {form.n_rigid}, {zeros} poles at exactly 0, so that some static response is infinite")
     try:
-        print(exact_reduction(model))
+        reduction = exact_reduction(model)
+        print(reduction)
+        print(_unstable_in_words(model, reduction.order), end="")
     except HalfdofError as refusal:
         print(f"No state space: {refusal}")
     return DONE
+
+
+def _unstable_in_words(model: SecondOrderModel, order: int) -> str:
+    """Say which poles are right of the imaginary axis by more than rounding; nothing where none is."""
+    if order > LARGEST_PENCIL:
+        return f"Stability: not looked at above {LARGEST_PENCIL} states.\n"
+    poles = bounded_poles(working_matrix(model))
+    unstable = poles.values[poles.values.real > SURE * poles.bounds]
+    if not unstable.size:
+        return ""
+    fastest = complex_in_words(complex(unstable[np.argmax(unstable.real)]))
+    return f"Unstable: {unstable.size} of {order} poles are right of the imaginary axis, the fastest {fastest} rad/s\n"
 
 
 def run_ss(arguments: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is t
     M q'' + (C + B K L_v) q' + (K + B K L_q) q = B u.                                      (13)
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, get_args
 
