@@ -14,6 +14,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from typing import TYPE_CHECKING, NoReturn
 
 from halfdof_ctrl.base.command_start import PROGRAM
 from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
@@ -38,6 +39,9 @@ from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
 from halfdof_ctrl.systems.state_map import KINDS
 from halfdof_ctrl.terminal import TerminatedError, asked_output_only, orderly_end
+
+if TYPE_CHECKING:
+    from _typeshed import SupportsWrite
 
 EXAMPLES = {
     "report": "hydromount -o report",
@@ -101,8 +105,42 @@ def _say(kind: str, text: str) -> None:
         print(f"{PROGRAM}: {kind}: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser that says in one line what is wrong."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print one line, whatever the arguments contain, and end."""
+        _say("error", f"{message}. usage: {self.prog} --help lists what can be given.")
+        raise SystemExit(REFUSED)
+
+    def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
+        """Print help; what cannot be printed is an error, which argparse keeps to itself."""
+        stream = sys.stderr if file is None else file
+        if message and stream is not None:
+            stream.write(message)
+            sys.stdout.flush()
+
+
+class _Once(argparse.Action):
+    """Store a value, and refuse a second one instead of forgetting the first."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        """Store the value."""
+        given: set[str] = vars(namespace).setdefault("_given", set())
+        if self.dest in given:
+            parser.error(f"{option_string} is given twice")
+        given.add(self.dest)
+        setattr(namespace, self.dest, values)
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog=PROGRAM,
         description="Exact state space of mechanical models M, C, K with singular mass.",
         epilog="Exit codes: 0 done, 1 the cross-check failed, 2 the request or the model is refused.",
@@ -122,14 +160,18 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("info", run_info, "print what is in the files, the model, its pencil and its reduction", None)
     ss = add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
-    ss.add_argument("--states", choices=KINDS, default="dofs", help="what the states are (default: dofs)")
+    ss.add_argument("--states", action=_Once, choices=KINDS, default="dofs", help="what the states are (default: dofs)")
     bode = add("bode", run_bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
     bode.add_argument("--db", action="store_true", help="magnitude axes of the figure in dB")
     step = add("step", run_step, "write the step response (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
-    step.add_argument("--amplitude", type=float, default=1.0, metavar="A", help="of the step, of a nonlinear model")
-    step.add_argument("--time", type=float, metavar="T", help="last time [s] (default: until the modes settle)")
+    step.add_argument(
+        "--amplitude", action=_Once, type=float, metavar="A", help="of the step, of a nonlinear model (default: 1)"
+    )
+    step.add_argument(
+        "--time", action=_Once, type=float, metavar="T", help="last time [s] (default: until the modes settle)"
+    )
     add("poles", run_poles, "print eigenvalues before and after, and draw the pole map (png, svg, pdf)", "FILE")
     what = "write the dynamic stiffness at a DOF and its loss angle over Hz (png, svg, pdf), or the numbers (csv)"
     stiffness = add("stiffness", run_stiffness, what, "FILE", needed=True, signals=False)
@@ -150,7 +192,9 @@ def _parser() -> argparse.ArgumentParser:
     regulator = add("lqr", run_lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
     for kind in WEIGHTS:
         regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
-    regulator.add_argument("--energy", type=float, metavar="W", help="weight of the mechanical energy [1/J]")
+    regulator.add_argument(
+        "--energy", action=_Once, type=float, metavar="W", help="weight of the mechanical energy [1/J]"
+    )
     add("check", run_check, "check the state space against the descriptor form; write the figures (json)", "FILE")
     return parser
 
@@ -166,15 +210,17 @@ def _known_parameters() -> str:
 
 
 def _add_frequencies(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--omega-min", type=float, metavar="W", help="lowest frequency [rad/s]")
-    parser.add_argument("--omega-max", type=float, metavar="W", help="highest frequency [rad/s]")
-    parser.add_argument("--f-min", type=float, metavar="F", help="lowest frequency [Hz]")
-    parser.add_argument("--f-max", type=float, metavar="F", help="highest frequency [Hz]")
-    parser.add_argument("--points", type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})")
+    parser.add_argument("--omega-min", action=_Once, type=float, metavar="W", help="lowest frequency [rad/s]")
+    parser.add_argument("--omega-max", action=_Once, type=float, metavar="W", help="highest frequency [rad/s]")
+    parser.add_argument("--f-min", action=_Once, type=float, metavar="F", help="lowest frequency [Hz]")
+    parser.add_argument("--f-max", action=_Once, type=float, metavar="F", help="highest frequency [Hz]")
+    parser.add_argument(
+        "--points", action=_Once, type=int, metavar="N", help=f"number of frequencies (default {DEFAULT_POINTS})"
+    )
 
 
 def _add_command(
-    commands: "argparse._SubParsersAction[argparse.ArgumentParser]",
+    commands: "argparse._SubParsersAction[_Parser]",
     name: str,
     command: Callable[[argparse.Namespace], int],
     purpose: str,
@@ -200,7 +246,7 @@ def _add_command(
     what = "name of a matrix in a file with several: C=D, K=sys.K, M=maa#2; C= for none"
     parser.add_argument("--matrix", action="append", default=[], metavar="K=NAME", help=what)
     parser.add_argument(
-        "--triangle", choices=("lower", "upper"), help="files store this triangle of symmetric matrices"
+        "--triangle", action=_Once, choices=("lower", "upper"), help="files store this triangle of symmetric matrices"
     )
     parser.add_argument("--remove-fixed", action="store_true", help="take out DOFs whose stiffness is 1e35 or more")
     parser.add_argument(
@@ -216,5 +262,5 @@ def _add_command(
         parser.add_argument("--outputs", action="append", metavar="A,B", help="outputs, as y, y_dot, y_ddot")
     if target is not None:
         where = f"where to write; the ending of the {target.lower()} is its format" if target == "FILE" else "where"
-        parser.add_argument("-o", metavar=target, required=needed, help=where)
+        parser.add_argument("-o", action=_Once, metavar=target, required=needed, help=where)
     return parser

@@ -211,6 +211,9 @@ def run_step(arguments: argparse.Namespace) -> int:
     given = _given_model(arguments)
     if isinstance(given, NonlinearModel):
         return _nonlinear_step(given, arguments, kind)
+    if arguments.amplitude is not None:
+        msg = "--amplitude is about nonlinear models; of this one, multiply the response to a unit step by it."
+        raise ParameterError(msg, parameter="--amplitude", value=arguments.amplitude)
     model = _with_few_signals(given, arguments)
     if kind in TABLE_ENDINGS:
         with np.errstate(over="ignore", invalid="ignore"):  # which is refused below
@@ -279,7 +282,8 @@ def _nonlinear_step(model: NonlinearModel, arguments: argparse.Namespace, kind: 
         if category is not LostStateWarning:  # of the tangent that only says how long to look
             give_warning(message, category)
     times = step_times(relevant_poles(system.A, system.B, system.C, system.D), arguments.time)
-    save_response(nonlinear_response(model, times, arguments.amplitude), arguments.o)
+    amplitude = 1.0 if arguments.amplitude is None else arguments.amplitude
+    save_response(nonlinear_response(model, times, amplitude), arguments.o)
     return DONE
 
 

@@ -1,5 +1,6 @@
 """What the command does with its streams and signals, so that nothing but what was asked for is on stdout."""
 
+import _thread
 import ctypes
 import errno
 import io
@@ -11,9 +12,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
 
+from halfdof_ctrl.base.command_start import is_command
 from halfdof_ctrl.base.names import printable
 
 STDOUT, STDERR = 1, 2  #: file descriptors
+OURS = (signal.SIGINT, signal.SIGTERM)  #: signals that end the command in order
+AGAIN_SECONDS = 0.01  #: after which a signal that was lost in a destructor is given once more
 
 
 class TerminatedError(BaseException):
@@ -79,27 +83,47 @@ def asked_output_only() -> Iterator[None]:
             stream.close()
 
 
+class _Signals:
+    """What is done when a signal arrives that ends the command."""
+
+    def __init__(self) -> None:
+        self.hook = sys.unraisablehook
+        self.received: list[int] = []
+
+    def end(self, number: int, frame: FrameType | None) -> None:
+        """Raise what takes away on its way out what is half-written."""
+        self.received.append(number)
+        if number == signal.SIGINT:
+            raise KeyboardInterrupt
+        raise TerminatedError(number, frame is None)
+
+    def again(self, lost: "sys.UnraisableHookArgs") -> None:
+        """Give a signal once more that Python has lost, since it arrived in a destructor; keep quiet about the rest."""
+        if not self.received:
+            self.hook(lost)
+        elif lost.exc_type is not None and issubclass(lost.exc_type, (KeyboardInterrupt, TerminatedError)):
+            threading.Timer(AGAIN_SECONDS, _thread.interrupt_main, (self.received[-1],)).start()
+
+
 @contextmanager
 def orderly_end() -> Iterator[None]:
     """Let SIGTERM end the command as Ctrl-C does, and give Ctrl-C back what the start of the program took."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-    before = signal.getsignal(signal.SIGTERM)
-    if before is not signal.SIG_DFL:
-        yield
-        return
-    signal.signal(signal.SIGTERM, _terminate)
+    signals, taken = _Signals(), {}
+    for number in OURS:
+        before = signal.getsignal(number)
+        if before in {signal.SIG_DFL, signal.default_int_handler}:
+            taken[number] = before
+            signal.signal(number, signals.end)
+    sys.unraisablehook = signals.again
     try:
         yield
     finally:
-        signal.signal(signal.SIGTERM, before)
-
-
-def _terminate(number: int, frame: FrameType | None) -> None:
-    raise TerminatedError(number, frame is None)
+        sys.unraisablehook = signals.hook
+        for number, before in taken.items():
+            signal.signal(number, signal.SIG_DFL if is_command() else before)
 
 
 def _is_descriptor(stream: io.TextIOBase | object, number: int) -> bool:

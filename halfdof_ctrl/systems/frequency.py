@@ -41,6 +41,7 @@ from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
 
 SYSTEM_OR_MODEL = "a model of mechss or a control.StateSpace"  #: what a frequency response is of
+HIGHEST = 1e150  #: [rad/s] of a frequency, whose square times a mass must be a number
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
 GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
@@ -275,6 +276,9 @@ def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:
     frequencies = np.atleast_1d(real_numbers(omega, "omega", "real numbers [rad/s]"))
     if frequencies.ndim != 1 or frequencies.size == 0 or not (np.isfinite(frequencies) & (frequencies >= 0.0)).all():
         msg = "omega must be a list of one or more finite frequencies [rad/s], none of them negative."
+        raise ParameterError(msg, parameter="omega", value=omega)
+    if frequencies.max() > HIGHEST:
+        msg = f"omega reaches {frequencies.max():.3g} rad/s, but squares of frequencies above {HIGHEST:.0e} overflow."
         raise ParameterError(msg, parameter="omega", value=omega)
     return frequencies
 

@@ -4,9 +4,12 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+
+from halfdof_ctrl.terminal import TerminatedError, orderly_end
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals and limits of POSIX")
 STOPPED_IMPORT = """
@@ -116,3 +119,34 @@ def test_ctrl_c_while_the_command_imports_says_nothing(tmp_path: Path) -> None:
             assert (done.returncode, done.stderr) == (-signal.SIGINT, "")
         else:
             assert "KeyboardInterrupt" in done.stderr
+
+
+class Dying:
+    """Something in whose destructor a signal arrives."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+
+    def __del__(self) -> None:
+        """Receive the signal, which Python reports and forgets."""
+        signal.raise_signal(self.number)
+
+
+def _receive_in_a_destructor(number: int) -> None:
+    with orderly_end():
+        one = Dying(number)
+        del one
+        for _ in range(6000):
+            time.sleep(0.01)
+
+
+@pytest.mark.parametrize(("number", "error"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, TerminatedError)])
+def test_a_signal_that_arrives_in_a_destructor_is_not_lost(
+    capsys: pytest.CaptureFixture[str], number: signal.Signals, error: type[BaseException]
+) -> None:
+    """It is given once more, and nothing is printed; afterwards all is as it was."""
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.unraisablehook
+    with pytest.raises(error):
+        _receive_in_a_destructor(number)
+    assert capsys.readouterr() == ("", "")
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
