@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, NoReturn
 from halfdof_ctrl.base.command_start import PROGRAM
 from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
 from halfdof_ctrl.base.names import printable
+from halfdof_ctrl.base.progress import activity, clear_activity
 from halfdof_ctrl.commands import (
     BUILT_IN,
     DONE,
@@ -68,7 +69,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments = _parser().parse_args(argv)
             command: Callable[[argparse.Namespace], int] = arguments.command
             without_windows()
-            code = command(arguments)
+            with activity(f"{PROGRAM} {getattr(arguments, 'name', '')}".strip()):
+                code = command(arguments)
             sys.stdout.flush()
         if any(issubclass(warning.category, InterruptedResponseWarning) for warning in caught):
             code = INTERRUPTED  # what was done is written
@@ -102,6 +104,7 @@ def _warnings_on_stderr() -> Iterator[list[warnings.WarningMessage]]:
 
 def _say(kind: str, text: str) -> None:
     if sys.stderr is not None:
+        clear_activity()
         print(f"{PROGRAM}: {kind}: {printable(' '.join(text.split()))}", file=sys.stderr)
 
 
@@ -236,7 +239,7 @@ def _add_command(
         epilog=f"Example: {PROGRAM} {name} {EXAMPLES[name]}",
         allow_abbrev=False,
     )
-    parser.set_defaults(command=command, alone=False)
+    parser.set_defaults(command=command, name=name, alone=False)
     parser.add_argument(
         "model",
         metavar="MODEL",

@@ -14,6 +14,7 @@ from types import FrameType
 
 from halfdof_ctrl.base.command_start import is_command
 from halfdof_ctrl.base.names import printable
+from halfdof_ctrl.base.progress import clear_activity
 
 STDOUT, STDERR = 1, 2  #: file descriptors
 OURS = (signal.SIGINT, signal.SIGTERM)  #: signals that end the command in order
@@ -29,6 +30,7 @@ class _Printable(io.TextIOWrapper):
 
     def write(self, text: str) -> int:
         """Write text with control characters as escapes."""
+        clear_activity()
         super().write(printable(text))
         return len(text)
 

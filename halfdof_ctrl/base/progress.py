@@ -1,20 +1,29 @@
 """Progress of long runs: a bar by tqdm on a terminal or in a notebook, nothing anywhere else.
 
 Nothing is shown in the first second, so that short runs leave no trace, and nothing inside `silence`, so that the
-cases of a sweep do not draw bars of their own into that of the sweep.
+cases of a sweep do not draw bars of their own into that of the sweep. What does not go step by step shows how long it
+has been at work (`activity`), until something inside it has a bar.
 """
 
+import functools
+import os
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sized
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 
 Step = TypeVar("Step")
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 DELAY = 1.0  #: [s] before a bar appears
+TICK = 0.5  #: [s] between two looks at the clock
 
 _SILENT: ContextVar[bool] = ContextVar("_SILENT", default=False)
+_ACTIVITY: ContextVar["_Clock | None"] = ContextVar("_ACTIVITY", default=None)
 
 
 def progress(steps: Iterable[Step], what: str, *, total: int | None = None, show: bool | None = None) -> Iterator[Step]:
@@ -73,14 +82,121 @@ def progress_bar(total: int | None, what: str, *, show: bool | None = None) -> I
     """
     from tqdm import tqdm  # noqa: PLC0415  # costs time, which a bare import of the package does not need
 
-    hidden = _SILENT.get() or sys.stderr is None or not (_is_watched() if show is None else show)
-    switch = {"disable": True} if hidden else {}  # otherwise left to the user, who may have set TQDM_DISABLE
-    with tqdm(total=total, desc=what, delay=DELAY, file=sys.stderr, **switch) as bar:
+    switch = {"disable": True} if _is_hidden(show) else {}  # otherwise left to the user, who may have set TQDM_DISABLE
+    with _instead_of_the_clock(), tqdm(total=total, desc=what, delay=DELAY, file=sys.stderr, **switch) as bar:
 
         def advance(steps: int) -> None:
             bar.update(steps)
 
         yield advance
+
+
+@contextmanager
+def activity(what: str, *, show: bool | None = None) -> Iterator[None]:
+    """Show how long something has been at work of which nobody knows how long it takes.
+
+    Inside another activity it shows nothing of its own, and while a bar is shown the clock is not.
+
+    Parameters
+    ----------
+    what : str
+        What is done, in a word or two.
+    show : bool, optional
+        As in `progress_bar`.
+
+    Examples
+    --------
+    >>> with activity("zeros"):
+    ...     1 + 1
+    2
+    """
+    if _is_hidden(show) or _ACTIVITY.get() is not None or os.environ.get("TQDM_DISABLE", "0") not in {"", "0"}:
+        yield
+        return
+    clock = _Clock(what)
+    token = _ACTIVITY.set(clock)
+    clock.start()
+    try:
+        yield
+    finally:
+        _ACTIVITY.reset(token)
+        clock.stop()
+
+
+def shows_activity(what: str) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
+    """Have a function show how long it has been at work, as `activity` does."""
+
+    def decorated(function: Callable[Given, Result]) -> Callable[Given, Result]:
+        @functools.wraps(function)
+        def shown(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+            with activity(what):
+                return function(*args, **kwargs)
+
+        return shown
+
+    return decorated
+
+
+def clear_activity() -> None:
+    """Take away the line of the activity that is shown, before something is printed; it comes again with its clock."""
+    clock = _ACTIVITY.get()
+    if clock is not None:
+        clock.clear()
+
+
+class _Clock(threading.Thread):
+    """Writes again and again how long an activity has lasted, on one line that it takes away."""
+
+    def __init__(self, what: str) -> None:
+        super().__init__(name="halfdof_ctrl clock", daemon=True)
+        self.what, self.begin, self.stream, self.shown = what, time.monotonic(), sys.stderr, 0
+        self.over, self.lock, self.covered = threading.Event(), threading.Lock(), 0
+
+    def run(self) -> None:
+        """Tick."""
+        wait = DELAY
+        while not self.over.wait(wait):
+            wait = TICK
+            with self.lock:
+                if not self.covered and not self.over.is_set():
+                    self._write(f"{self.what}: {time.monotonic() - self.begin:.0f} s")
+
+    def clear(self) -> None:
+        """Take the line away."""
+        with self.lock:
+            if self.shown:
+                self._write("")
+
+    def stop(self) -> None:
+        """Take the line away for good."""
+        self.over.set()
+        self.clear()
+        self.join()
+
+    def cover(self, more: int) -> None:
+        """Keep quiet while something else shows how far it is."""
+        self.clear()
+        with self.lock:
+            self.covered += more
+
+    def _write(self, text: str) -> None:
+        with suppress(OSError, ValueError):  # a terminal that went away
+            self.stream.write(f"\r{text:<{self.shown}}\r")
+            self.stream.flush()
+        self.shown = len(text)
+
+
+@contextmanager
+def _instead_of_the_clock() -> Iterator[None]:
+    """Stop the clock of the activity around while something else shows how far it is."""
+    clock = _ACTIVITY.get()
+    if clock is not None:
+        clock.cover(1)
+    try:
+        yield
+    finally:
+        if clock is not None:
+            clock.cover(-1)
 
 
 @contextmanager
@@ -98,6 +214,10 @@ def silence() -> Iterator[None]:
         yield
     finally:
         _SILENT.reset(token)
+
+
+def _is_hidden(show: bool | None) -> bool:  # noqa: FBT001  # as the functions above have it
+    return _SILENT.get() or sys.stderr is None or not (_is_watched() if show is None else show)
 
 
 def _is_watched() -> bool:

@@ -9,6 +9,7 @@ from functools import cached_property
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
+from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.spectrum import order_by_size
 from halfdof_ctrl.descriptor.finite_part import infinite_part
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
@@ -69,6 +70,7 @@ class PencilStructure:
         return improper_pairs(self.model, self.finite_eigenvalues, self.most_index, self.most_finite)
 
 
+@shows_activity("eigenvalues of the pencil")
 def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     """Find the finite eigenvalues of the descriptor form and the structure of the infinite ones.
 

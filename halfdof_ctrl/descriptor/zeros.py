@@ -9,6 +9,7 @@ import scipy.linalg
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
 from halfdof_ctrl.base.errors import CloseDecisionWarning, HalfdofError, MatrixError, give_warning
+from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.growth import system_pencil
@@ -20,6 +21,7 @@ from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 
+@shows_activity("zeros")
 def zeros(model: SecondOrderModel) -> ComplexArray:
     """Find the invariant zeros from the second-order system pencil.
 

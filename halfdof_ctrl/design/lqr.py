@@ -33,6 +33,7 @@ from halfdof_ctrl.base.errors import (
     give_warning,
 )
 from halfdof_ctrl.base.names import force_names, listed, motion_names
+from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, PhysicalWeights, Weights, checked_weights, given_cost, physical_cost
 from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
@@ -149,6 +150,7 @@ def _rebuilt(others: dict[str, Any], matrices: tuple[FloatArray, ...], labels: d
     return StateFeedback(**others, closed_loop=control.StateSpace(*matrices, **labels))
 
 
+@shows_activity("regulator")
 def lqr(
     model: SecondOrderModel,
     Q: npt.ArrayLike | None = None,

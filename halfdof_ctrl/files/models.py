@@ -20,6 +20,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import EPS, is_zero
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.files.containers import PathLike
 from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
@@ -74,6 +75,7 @@ def save_model(model: SecondOrderModel | NonlinearModel, path: PathLike) -> None
     save_matrices(path, content, names | {key: texts for key, texts in more.items() if texts}, model.name)
 
 
+@shows_activity("reading the model")
 def load_model(
     path: Paths,
     *,

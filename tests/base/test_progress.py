@@ -1,6 +1,7 @@
 """Progress is shown to somebody who watches, and to nobody else."""
 
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import SimpleNamespace
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 
 from halfdof_ctrl.base import progress as module
-from halfdof_ctrl.base.progress import progress, progress_bar, silence
+from halfdof_ctrl.base.progress import activity, clear_activity, progress, progress_bar, shows_activity, silence
 
 
 @pytest.fixture(autouse=True)
@@ -98,3 +99,67 @@ def test_a_process_without_stderr_is_no_reason_to_fail(monkeypatch: pytest.Monke
     """Windows starts some without."""
     monkeypatch.setattr(sys, "stderr", None)
     assert list(progress([1, 2], "steps", show=True)) == [1, 2]
+
+
+def wait_for(text: str, capsys: pytest.CaptureFixture[str]) -> str:
+    """Wait until something stands on stderr, and give all that does."""
+    shown = ""
+    for _ in range(6000):
+        shown += capsys.readouterr().err
+        if text in shown:
+            return shown
+        time.sleep(0.01)
+    pytest.fail(f"{text!r} was not shown, but {shown!r}")
+
+
+def test_an_activity_shows_that_it_lasts(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """On one line, which is taken away before something is printed and at the end."""
+    terminal(monkeypatch)
+    with activity("zeros"):
+        wait_for("\rzeros: 0 s\r", capsys)
+        clear_activity()
+        assert capsys.readouterr().err.endswith("\r          \r")
+        wait_for("\rzeros: ", capsys)
+    assert capsys.readouterr().err.split("\r")[-2].strip() == ""
+
+
+def test_an_activity_gives_way_to_a_bar_inside(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """And comes back after it; an activity inside another has no line of its own."""
+    terminal(monkeypatch)
+    monkeypatch.setattr(module, "TICK", 0.01)
+    with activity("check"), activity("zeros"):
+        wait_for("check: ", capsys)
+        with progress_bar(2, "steps") as advance:
+            capsys.readouterr()
+            advance(2)
+            time.sleep(0.1)
+            assert "check" not in capsys.readouterr().err
+        shown = wait_for("check: ", capsys)
+    assert "2/2" in shown
+    assert "zeros" not in shown
+
+
+@pytest.mark.parametrize("watched", [True, False])
+def test_an_activity_that_nobody_watches_is_not_shown(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], *, watched: bool
+) -> None:
+    """Without a terminal, inside `silence`, or where bars are disabled."""
+    monkeypatch.setattr(module, "TICK", 0.01)
+    if watched:
+        terminal(monkeypatch)
+        monkeypatch.setenv("TQDM_DISABLE", "1")
+
+    @shows_activity("zeros")
+    def slow(x: int) -> int:
+        """Take some time."""
+        time.sleep(0.1)
+        return x
+
+    assert slow(3) == 3
+    monkeypatch.delenv("TQDM_DISABLE", raising=False)
+    with silence():
+        assert slow(x=4) == 4
+    assert slow.__doc__ == "Take some time."
+    assert capsys.readouterr().err == ""
