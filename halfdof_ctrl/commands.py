@@ -31,7 +31,6 @@ from halfdof_ctrl.files.models import inspect_files, load_model
 from halfdof_ctrl.files.systems import save_system
 from halfdof_ctrl.files.tables import GAIN_ENDINGS, TABLE_ENDINGS, save_gain, save_response
 from halfdof_ctrl.files.writing import replacing
-from halfdof_ctrl.model.dense_copy import small_dense
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.law_text import element_from_text
 from halfdof_ctrl.model.nonlinear import NonlinearModel, nlmechss
@@ -106,13 +105,12 @@ def run_info(arguments: argparse.Namespace) -> int:
         return DONE
     model = given
     print(model)
-    if len(model.dofs) > LARGEST_PENCIL and not model.is_sparse:
-        print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
-        return DONE
-    if model.is_sparse:
+    if len(model.dofs) > LARGEST_PENCIL:
+        if not model.is_sparse:
+            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+            return DONE
+        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
         model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
-    if small_dense(model, LARGEST_PENCIL) is None:
-        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs with mass, damping or a signal.")
     else:
         structure = pencil_structure(model)
         kind = "regular" if structure.is_regular else "SINGULAR"

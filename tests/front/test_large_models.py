@@ -28,7 +28,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     [
         (["poles"], "14 finite and 4404 infinite"),
         (["check"], "Cross-check passed"),
-        (["info"], "Pencil: regular, 14 finite and 4404 infinite eigenvalues, index 1"),
+        (["info"], "14 states, 4404 infinite eigenvalues removed, index 1"),
         (["lqr"], "StateFeedback"),
         (["lqr", "--displacement", "q77=1e6", "--effort", "F_q3=1e-4"], "StateFeedback u = -K x, 1 x 14"),
         (["ss", "-o", "ss.npz"], ""),
