@@ -11,8 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.double_double import matrix_product
+from halfdof_ctrl.base.names import force_names
+from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.design.care_problem import CareProblem
 from halfdof_ctrl.design.cost import Cost, PhysicalWeights
-from halfdof_ctrl.design.riccati import CareProblem
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 
@@ -24,18 +27,32 @@ class Plant:
     A: FloatArray  #: (N, N)
     B: FloatArray  #: (N, m)
     cost: Cost
+    sizes: FloatArray  #: (N, N) what the rounding errors of the entries of A are relative to
+    left_out: FloatArray | None  #: (N, N) what was taken from A as being rounding of nothing
+    shown: FloatArray | None  #: (N, N) K shown is the gain that errors are judged by; None for balanced states
     T: FloatArray | None  #: (N, N) from states of the reduction; None where they are these
     T_inverse: FloatArray | None  #: (N, N)
 
     @property
     def problem(self) -> CareProblem:
         """The Riccati equation."""
-        return CareProblem(self.A, self.B, self.cost.Q, self.cost.R, self.cost.N)
+        cost = self.cost
+        return CareProblem(self.A, self.B, cost.Q, cost.R, cost.N, self.sizes, self.left_out, self.shown)
 
 
 def plant_of(reduction: ExactReduction, cost: Cost) -> Plant:
     """Return A and B of a reduction, entries of A that are rounding of nothing set to zero."""
-    return Plant(A=reduction.solution.without_rounding(), B=reduction.B, cost=cost, T=None, T_inverse=None)
+    A = reduction.solution.without_rounding()
+    return Plant(
+        A=A,
+        B=reduction.B,
+        cost=cost,
+        sizes=reduction.solution.rounding_sizes(),
+        left_out=reduction.A - A,
+        shown=None,
+        T=None,
+        T_inverse=None,
+    )
 
 
 def plant_in_energy_states(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | None) -> Plant | None:
@@ -57,7 +74,33 @@ def plant_in_energy_states(reduction: ExactReduction, cost: Cost, weights: Physi
     else:
         Q, N = _physical(form, weights)
     inner = Cost((Q + Q.T) / 2.0, cost.R, N)
-    return Plant(A=form.A, B=form.B, cost=inner, T=form.T, T_inverse=form.T_inverse)
+    return Plant(
+        A=form.A,
+        B=form.B,
+        cost=inner,
+        sizes=np.abs(form.A),
+        left_out=_of_free_motions(form),
+        shown=form.T * balanced_states(reduction.A)[1],
+        T=form.T,
+        T_inverse=form.T_inverse,
+    )
+
+
+def _of_free_motions(form: EnergyForm) -> FloatArray | None:
+    """Return what the stored stiffness does beyond that of the strains: rounding, in motions that are left free."""
+    model, count, end = form.model, form.n_rigid, form.n_rigid + form.n_massive + form.n_strains
+    pushed = energy_system(model.select(inputs=force_names(model.dofs))) if count else None
+    if pushed is None:
+        return None
+    K, displacement = np.asarray(model.K, dtype=float), form.displacement.X
+    strains = form.from_q[form.n_rigid + form.n_massive : end]
+    if np.abs(form.from_q).any(axis=0).all():  # no static DOFs, whose springs the strains hold in series
+        held = matrix_product(strains.T, strains)
+        force = ((K - held[0]) - held[1]) @ displacement
+    else:
+        force = np.zeros_like(displacement)
+        force[:, :count] = np.add(*matrix_product(K, displacement[:, :count]))
+    return np.asarray(-pushed.B @ force)
 
 
 def _physical(form: EnergyForm, weights: PhysicalWeights) -> tuple[FloatArray, FloatArray]:

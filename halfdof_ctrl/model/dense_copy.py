@@ -67,6 +67,11 @@ def with_few_signals(model: SecondOrderModel) -> SecondOrderModel:
     return model.select(model.inputs[0], model.outputs[0])
 
 
+def is_large(model: SecondOrderModel) -> bool:
+    """Return whether a model has more than 2000 DOFs, inputs or outputs, whose dense copy would be too large."""
+    return max(len(model.dofs), len(model.inputs), len(model.outputs)) > LARGEST_DENSE_COPY
+
+
 def complex_model_error(model: SecondOrderModel) -> ComplexModelError:
     """Make the refusal of a real state space for a complex model."""
     letters = model.complex_matrices

@@ -9,9 +9,21 @@ import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy import sparse
 
-from halfdof_ctrl import SecondOrderModel, StateFeedback, crosscheck, hydromount, lqr, mech2ss, mechss, pencil_structure
+from halfdof_ctrl import (
+    SecondOrderModel,
+    StateFeedback,
+    crosscheck,
+    exact_reduction,
+    hydromount,
+    lqr,
+    mech2ss,
+    mechss,
+    pencil_structure,
+)
 from halfdof_ctrl.base.errors import SignalNameError, StabilizationError, WeightError
+from halfdof_ctrl.design import optimal_gain
 
 RICCATI = 1e-9  # two Riccati solvers agree to the square root of their condition, here far better
 SOLVERS: tuple[Literal["scipy", "slycot"], ...] = ("scipy", "slycot")
@@ -160,19 +172,62 @@ def test_unreached_mode_is_refused_with_the_force_that_reaches_it() -> None:
     assert caught.value.quantity in {"F_a", "F_b"}
 
 
-def test_solver_that_fails_or_does_not_stabilize_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A zero gain on an undamped system, or an exception of the solver, becomes one clear refusal."""
+def test_solver_that_fails_or_does_not_stabilize_costs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a start, or with a zero gain on an undamped system, K is (sqrt(2) - 1, sqrt(2 (sqrt(2) - 1))) as ever."""
     model = mechss([[1]], [[0]], [[1]], dofs="y")
+    expected = [[np.sqrt(2.0) - 1.0, np.sqrt(2.0 * (np.sqrt(2.0) - 1.0))]]
     monkeypatch.setattr(control, "lqr", lambda A, B, *_, **__: (np.zeros(B.T.shape), np.zeros(A.shape), None))
-    with pytest.raises(StabilizationError, match="although nothing hides a mode from inputs and cost: a pole stays at"):
-        lqr(model, displacement={"y": 1.0}, effort={"F_y": 1.0})
+    assert_allclose(lqr(model, displacement={"y": 1.0}, effort={"F_y": 1.0}).K, expected, rtol=RICCATI)
 
     def failing(*_: object, **__: object) -> None:
         raise scipy.linalg.LinAlgError
 
     monkeypatch.setattr(control, "lqr", failing)
-    with pytest.raises(StabilizationError, match="The solver found no stabilizing gain"):
-        lqr(model, displacement={"y": 1.0}, effort={"F_y": 1.0})
+    assert_allclose(lqr(model, displacement={"y": 1.0}, effort={"F_y": 1.0}).K, expected, rtol=RICCATI)
+
+
+def test_equation_that_is_not_solved_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no gain is found, although one may exist, the pole that stays is named."""
+    monkeypatch.setattr(optimal_gain, "solved_care", lambda *_, **__: None)
+    with pytest.raises(StabilizationError, match="although nothing hides a mode from inputs and cost: a pole stays at"):
+        lqr(mechss([[1]], [[0]], [[1]], dofs="y"), displacement={"y": 1.0}, effort={"F_y": 1.0})
+
+
+def test_free_body_in_odd_stiffness_is_refused_whatever_its_rows_sum_to() -> None:
+    """Springs of 27 kN/m and 6 mN/m in a row, whose entries are rounded: velocities alone do not see where they are."""
+    a, b = 26971.1, 0.00553
+    model = mechss(
+        np.diag([0.1, 54.0, 0.95]), None, [[a, -a, 0.0], [-a, a + b + 3e-12, -b], [0.0, -b, b]], dofs=["a", "b", "c"]
+    )
+    with pytest.raises(StabilizationError, match=r"the cost sees it by .* not told from nothing"):
+        lqr(model.select("F_a"), velocity={"a": 1.0, "b": 1.0, "c": 1.0}, effort={"F_a": 1.0})
+
+
+def test_large_sparse_model_with_few_states_is_regulated() -> None:
+    """A mass in the middle of a string of 2500 nodes is one on the springs in series on either side."""
+    n, k = 2501, 1e4
+    K = sparse.diags_array([np.full(n, 2 * k), np.full(n - 1, -k), np.full(n - 1, -k)], offsets=[0, 1, -1]).tocsc()
+    mass, drag = np.zeros(n), np.zeros(n)
+    mass[1250], drag[1250] = 2.0, 0.5
+    model = mechss(sparse.diags_array(mass).tocsc(), sparse.diags_array(drag).tocsc(), K).select("F_q1250", "q1250")
+    stiffness = 2.0 * k / 1251.0
+    one = mechss([[2.0]], [[0.5]], [[stiffness]], dofs="q1250")
+    weights = {"displacement": {"q1250": 3.0}, "energy": 2.0, "effort": {"F_q1250": 1e-2}}
+    feedback, expected = lqr(model, **weights), lqr(one, **weights)
+    assert_allclose(feedback.K, expected.K, rtol=RICCATI)
+    closed = exact_reduction(feedback.as_mechss())
+    assert_allclose(sorted_poles(np.linalg.eigvals(closed.A)), sorted_poles(feedback.poles), rtol=POLES)
+
+
+def test_mode_of_a_large_sparse_model_that_no_input_reaches_is_refused_by_the_force_that_does() -> None:
+    """A second mass apart from the string is moved by no force on it."""
+    n = 2501
+    K = sparse.diags_array([np.full(n, 2.0), np.full(n - 2, -1.0), np.full(n - 2, -1.0)], offsets=[0, 2, -2]).tocsc()
+    mass = np.zeros(n)
+    mass[[100, 101]] = 1.0
+    model = mechss(sparse.diags_array(mass).tocsc(), None, K).select("F_q4", "q100")
+    with pytest.raises(StabilizationError, match="input F_q101"):
+        lqr(model, displacement={"q100": 1.0, "q101": 1.0}, effort={"F_q4": 1.0})
 
 
 @pytest.mark.parametrize("weight", [-1.0, float("nan"), float("inf"), True, "1", 1j])

@@ -72,6 +72,10 @@ class Deflation(FromEquations):
         """Return A as it is: what of it is rounding is not followed entry by entry."""
         return self.A
 
+    def rounding_sizes(self) -> FloatArray:
+        """Return the sizes of the entries of A."""
+        return np.abs(self.A)
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions about blocks of J, equation (16)."""
         return self.evidence.decisions

@@ -64,7 +64,15 @@ class SingleSolve(FromEquations):
         return output_signal(model, self.equations, self._rounding)
 
     def without_rounding(self) -> FloatArray:
-        """Return A with zeros for entries that may be rounding of zero.
+        """Return A with zeros for entries that may be rounding of zero."""
+        return np.where(np.abs(self.A) <= 2.0 * ENTRY_ROUNDING * self._terms(), 0.0, self.A)
+
+    def rounding_sizes(self) -> FloatArray:
+        """Return what the rounding errors of the entries of A are relative to."""
+        return np.maximum(np.abs(self.A), self._terms())
+
+    def _terms(self) -> FloatArray:
+        """Return the sizes of the sums that the lower rows of A are.
 
         An entry of the solution ``W^-1 R`` of (3) is known to ``u |W^-1| (|W| |W^-1| |R| + |R|)`` times a small number.
         """
@@ -73,11 +81,8 @@ class SingleSolve(FromEquations):
         size = np.abs(leading_columns(model, part))
         inverse = np.abs(self.leading.solve(np.eye(len(size))))
         right = np.abs(np.hstack([part.times_basis(model.K, 0, moving), part.times_basis(model.C, 0, n_i)]))
-        doubt = ENTRY_ROUNDING * (inverse @ (size @ (inverse @ right) + right))
-        A = self.A.copy()
-        rows = np.vstack([doubt[n_i:moving], doubt[:n_i]])
-        A[n_i:][np.abs(A[n_i:]) <= rows] = 0.0
-        return A
+        sums = (inverse @ (size @ (inverse @ right) + right)) / 2.0
+        return np.vstack([np.zeros((n_i, sums.shape[1])), sums[n_i:moving], sums[:n_i]])
 
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates and the singular values of W."""

@@ -98,6 +98,9 @@ class ReductionMethod(Protocol):
     def without_rounding(self) -> FloatArray:
         """Return A with zeros for entries that may be rounding of zero."""
 
+    def rounding_sizes(self) -> FloatArray:
+        """Return what the rounding errors of the entries of A are relative to, (N, N)."""
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the singular values that decisions about ranks rest on, those of W last."""
 

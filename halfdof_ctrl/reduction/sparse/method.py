@@ -94,6 +94,10 @@ class SparseSolve:
         """Return A as it is: what of it is rounding is not followed entry by entry."""
         return self.A
 
+    def rounding_sizes(self) -> FloatArray:
+        """Return the sizes of the entries of A."""
+        return np.abs(self.A)
+
     def decisions(self) -> tuple[RankDecision, ...]:
         """Return the decisions of the coordinates."""
         return self.coordinates.evidence
