@@ -7,7 +7,7 @@ The cost of the feedback u = -K x on a reduced model is
 
 Every quantity is C x + D u with the direct term of (4), so each weight w adds w C^T C to Q, w C^T D to N and
 w D^T D to R; half and static DOFs are weighted like any other. What `control.lqr` finds is improved by Newton's method
-(`riccati`), and accepted only if the closed loop is stable and the gain known to 1e-6.
+(`riccati`), and accepted only if the closed loop is stable and the gain optimal (`optimal_gain`).
 
 A feedback on x is one on q and q': with x = L_q q + L_v q' the closed loop is the second-order model
 
@@ -24,7 +24,7 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, read_only
 from halfdof_ctrl.base.doors import is_choice, shown
-from halfdof_ctrl.base.errors import ParameterError, WeightError
+from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, WeightError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.sparse_arrays import as_sparse
@@ -39,6 +39,7 @@ from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import labelled_system, system_of_model
 
+MOST_STATES = 2000  #: of a regulator: a few minutes, which grow with their cube
 DERIVATIVES = 3  #: displacement, velocity and acceleration, which a second-order model can feed back
 
 
@@ -51,7 +52,7 @@ class StateFeedback:
     cost: Cost  #: what was minimized
     K: FloatArray  #: (m, N) gain
     S: FloatArray  #: (N, N) solution of the Riccati equation: the cost from x is x^T S x
-    gain_error: float  #: estimated error of K, relative to the gain of each input in scaled states
+    gain_error: float  #: estimated error of K, and what rounding of the entries does to it, relative to each input's
     closed_loop: control.StateSpace  #: from the model's inputs to its outputs, with the feedback
     poles: ComplexArray  #: (N,) of the closed loop [rad/s]
 
@@ -185,7 +186,10 @@ def lqr(
         A weight on a DOF or input that is not there.
     StabilizationError
         No stabilizing gain: a mode on or right of the imaginary axis that the inputs do not reach, or one on
-        the axis that the cost does not see. Or none whose digits can be told: an estimated error above 1e-6.
+        the axis that the cost does not see. Or none whose digits can be told: a gain that solves its equation to
+        less than 1e-6, or one that rounding of the entries moves by more than a tenth.
+    ModelSizeError
+        More than 2000 states.
 
     Warns
     -----
@@ -208,6 +212,12 @@ def lqr(
     if model.is_sparse and not is_large(model):
         model = model.as_dense()
     reduction = exact_reduction(model)
+    if reduction.order > MOST_STATES:
+        msg = (
+            f"lqr works on models with up to {MOST_STATES} states; this one has {reduction.order}. Regulate its slow "
+            "modes: lqr(truncate_modes(model, f_max=...), ...)."
+        )
+        raise ModelSizeError(msg, size=reduction.order, limit=MOST_STATES)
     if reduction.order == 0:
         msg = "The model has no states: its displacements follow the inputs at once, and nothing is to be regulated."
         raise WeightError(msg, names=())

@@ -21,26 +21,23 @@ NAMES = ("m", "K_r", "K_rs", "K_v", "K_s", "C_rs", "C_h")
 VALUES = (20.0, 5000.0, 1000.0, 500.0, 500.0, 100.0, 300.0)
 
 
-def weak_mount(seed: int) -> tuple[SecondOrderModel, dict[str, dict[str, float]]]:
+def weak_mount(seed: int) -> tuple[SecondOrderModel, float, float]:
     """Give a mount with a damper of 1e-9 to 1 N s/m at the massless node that a cheap actuator drives."""
     generator = np.random.default_rng(seed)
     parameters = {name: value * 10 ** generator.uniform(-1, 1) for name, value in zip(NAMES, VALUES, strict=True)}
     parameters["C_rs"] = 10 ** generator.uniform(-9, 0)
-    weights = {
-        "displacement": {"y": 10 ** generator.uniform(-3, 8)},
-        "effort": {"F_y1": 10 ** generator.uniform(-22, 0)},
-    }
-    return hydromount(**parameters).select("F_y1", "y"), weights
+    weight, effort = 10 ** generator.uniform(-3, 8), 10 ** generator.uniform(-22, 0)
+    return hydromount(**parameters).select("F_y1", "y"), weight, effort
 
 
 @pytest.mark.parametrize("method", SOLVERS)
 @pytest.mark.parametrize("seed", range(12))
 def test_cheap_actuator_at_a_weak_damper_has_the_gain_of_its_stored_equation(seed: int, method: Solver) -> None:
     """Poles over 15 and costs over 30 decades: A, B, Q, R as stored, solved with 300 digits, give the same gain."""
-    model, weights = weak_mount(seed)
+    model, weight, effort = weak_mount(seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InaccurateGainWarning)
-        feedback = lqr(model, **weights, method=method)
+        feedback = lqr(model, displacement={"y": weight}, effort={"F_y1": effort}, method=method)
     cost, reduction = feedback.cost, feedback.reduction
     expected = gain_by_sign(reduction.A, reduction.B, cost.Q, cost.R, cost.N)
     assert_allclose(feedback.K, expected, rtol=DIGITS, atol=DIGITS * np.abs(expected).max())
@@ -48,12 +45,11 @@ def test_cheap_actuator_at_a_weak_damper_has_the_gain_of_its_stored_equation(see
 
 def test_rounding_of_a_barely_reached_mount_is_announced_and_too_much_of_it_refused() -> None:
     """A force at a damper of c reaches the mass by c w / K: of 1e-9 rounding leaves five digits, of 1e-14 none."""
-    weights = {"displacement": {"y": 1e6}, "effort": {"F_y1": 1e-4}}
     with pytest.warns(InaccurateGainWarning, match="The gain is known to"):
-        feedback = lqr(hydromount(C_rs=1e-9).select("F_y1", "y"), **weights)
+        feedback = lqr(hydromount(C_rs=1e-9).select("F_y1", "y"), displacement={"y": 1e6}, effort={"F_y1": 1e-4})
     assert 1e-7 < feedback.gain_error < 1e-3
     with pytest.raises(StabilizationError, match="rounding of the entries of A, B, Q and R moves it by"):
-        lqr(hydromount(C_rs=1e-14).select("F_y1", "y"), **weights)
+        lqr(hydromount(C_rs=1e-14).select("F_y1", "y"), displacement={"y": 1e6}, effort={"F_y1": 1e-4})
 
 
 @given(st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-6.0, 6.0))

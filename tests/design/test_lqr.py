@@ -22,7 +22,8 @@ from halfdof_ctrl import (
     mechss,
     pencil_structure,
 )
-from halfdof_ctrl.base.errors import SignalNameError, StabilizationError, WeightError
+from halfdof_ctrl.base.errors import ModelSizeError, SignalNameError, StabilizationError, WeightError
+from halfdof_ctrl.design import lqr as regulator
 from halfdof_ctrl.design import optimal_gain
 
 RICCATI = 1e-9  # two Riccati solvers agree to the square root of their condition, here far better
@@ -46,6 +47,13 @@ def two_masses(inputs: str | list[str]) -> SecondOrderModel:
 def sorted_poles(values: np.ndarray) -> np.ndarray:
     """Sort poles so that two lists of them can be compared."""
     return values[np.lexsort((values.imag.round(6), values.real.round(6)))]
+
+
+def string(n: int, k: float, step: int) -> sparse.csc_array:
+    """Give the stiffness of n nodes, each joined to those `step` before and after it, the outer ones to the ground."""
+    unit = sparse.eye_array(n)
+    beside = sparse.eye_array(n, k=step)
+    return sparse.csc_array(k * (2.0 * unit - beside - beside.T))
 
 
 def test_double_integrator_has_the_textbook_gain() -> None:
@@ -206,23 +214,32 @@ def test_free_body_in_odd_stiffness_is_refused_whatever_its_rows_sum_to() -> Non
 def test_large_sparse_model_with_few_states_is_regulated() -> None:
     """A mass in the middle of a string of 2500 nodes is one on the springs in series on either side."""
     n, k = 2501, 1e4
-    K = sparse.diags_array([np.full(n, 2 * k), np.full(n - 1, -k), np.full(n - 1, -k)], offsets=[0, 1, -1]).tocsc()
+    K = string(n, k, 1)
     mass, drag = np.zeros(n), np.zeros(n)
     mass[1250], drag[1250] = 2.0, 0.5
     model = mechss(sparse.diags_array(mass).tocsc(), sparse.diags_array(drag).tocsc(), K).select("F_q1250", "q1250")
     stiffness = 2.0 * k / 1251.0
     one = mechss([[2.0]], [[0.5]], [[stiffness]], dofs="q1250")
-    weights = {"displacement": {"q1250": 3.0}, "energy": 2.0, "effort": {"F_q1250": 1e-2}}
-    feedback, expected = lqr(model, **weights), lqr(one, **weights)
+    feedback, expected = (
+        lqr(each, displacement={"q1250": 3.0}, energy=2.0, effort={"F_q1250": 1e-2}) for each in (model, one)
+    )
     assert_allclose(feedback.K, expected.K, rtol=RICCATI)
     closed = exact_reduction(feedback.as_mechss())
     assert_allclose(sorted_poles(np.linalg.eigvals(closed.A)), sorted_poles(feedback.poles), rtol=POLES)
 
 
+def test_model_with_too_many_states_is_refused_with_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four states are too many where three are the limit."""
+    monkeypatch.setattr(regulator, "MOST_STATES", 3)
+    with pytest.raises(ModelSizeError, match=r"up to 3 states; this one has 4.*truncate_modes") as caught:
+        lqr(mount(), displacement={"y": 1.0}, effort={"F_y": 1.0})
+    assert (caught.value.size, caught.value.limit) == (4, 3)
+
+
 def test_mode_of_a_large_sparse_model_that_no_input_reaches_is_refused_by_the_force_that_does() -> None:
     """A second mass apart from the string is moved by no force on it."""
     n = 2501
-    K = sparse.diags_array([np.full(n, 2.0), np.full(n - 2, -1.0), np.full(n - 2, -1.0)], offsets=[0, 2, -2]).tocsc()
+    K = string(n, 1.0, 2)
     mass = np.zeros(n)
     mass[[100, 101]] = 1.0
     model = mechss(sparse.diags_array(mass).tocsc(), None, K).select("F_q4", "q100")

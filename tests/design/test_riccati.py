@@ -147,3 +147,23 @@ def test_gain_of_a_beam_does_not_depend_on_the_states_it_was_found_in() -> None:
         assert feedback.gain_error < BETWEEN
     assert_allclose(slowest[0].real, slowest[1].real, rtol=1e-5)
     assert_allclose(slowest[0].imag, slowest[1].imag, rtol=1e-5)
+
+
+@pytest.mark.parametrize("damper", [1e-13, 1e-6, 1.0])
+def test_undamped_modes_beside_a_weak_damper_are_reached(damper: float) -> None:
+    """A damper at a massless node apart has a pole 1e16 times faster than the mode; the gain is that without it."""
+    model = mechss(np.diag([2.0, 0.0]), np.diag([0.0, damper]), np.diag([8.0, 3e3]), dofs=["mass", "node"])
+    feedback = lqr(model.select("F_mass", "mass"), displacement={"mass": 1.0}, effort={"F_mass": 1.0})
+    alone = lqr(mechss([[2.0]], None, [[8.0]], dofs="mass"), displacement={"mass": 1.0}, effort={"F_mass": 1.0})
+    columns = [feedback.states.index(name) for name in alone.states]
+    assert_allclose(feedback.K[:, columns], alone.K, rtol=EXACT)
+
+
+def test_mode_hidden_in_coordinates_of_its_own_stays_refused() -> None:
+    """Of oscillators mixed by T one is not driven; the entries of T^T M T and T^T K T round, and hide it."""
+    T = np.array([[3.0, 1.1, -2.3], [0.7, 4.1, 1.9], [-1.3, 0.9, 3.7]])
+    M, C, K = np.diag([1.3, 2.7, 0.3]), np.diag([0.4, 0.0, 0.2]), np.diag([0.7, 31.1, 57.3])
+    B = T.T @ np.array([[1.0], [0.0], [0.3]])
+    model = mechss(T.T @ M @ T, T.T @ C @ T, T.T @ K @ T, B, inputs="u")
+    with pytest.raises(StabilizationError, match="not told from nothing"):
+        lqr(model, displacement=dict.fromkeys(model.dofs, 1.0), effort={"u": 1e-3})

@@ -29,7 +29,6 @@ WORKS: list[tuple[str, Callable[[SecondOrderModel], Any]]] = [
     ("pencil_structure", pencil_structure),
     ("zeros", zeros),
     ("crosscheck", lambda model: crosscheck(model, mech2ss(hydromount().select("F_y", "y")))),
-    ("lqr", lambda model: lqr(model, energy=1.0, effort={"F_q3": 1.0})),
     ("write_report", lambda model: write_report(model, Path("nowhere"))),
     ("default_effort", default_effort),
     ("pencil_structure", pole_map_plot),
