@@ -52,7 +52,7 @@ class Roundings:
         The last is for what was left out.
         """
         problem = self.problem
-        of_A = problem.A if problem.sizes is None else problem.sizes
+        of_A = np.abs(problem.A) if problem.sizes is None else np.where(problem.A != 0.0, problem.sizes, 0.0)
         for seed in range(SAMPLES):
             generator = np.random.default_rng(seed)
             dA, dB, dN, dQ = (

@@ -66,6 +66,13 @@ def test_drag_behind_a_massless_node_is_never_refused(k: float, d: float, m: flo
     assert_allclose(feedback.K, expected, rtol=allowed, atol=allowed * np.abs(expected).max())
 
 
+def test_stiffness_that_cancels_in_a_row_of_springs_is_no_doubt_of_the_gain() -> None:
+    """A free mass behind a spring a million times too stiff for its gain is known to all digits."""
+    model = mechss(np.diag([0.0, 3.0]), np.diag([0.0, 0.7]), [[7e9, -7e9], [-7e9, 7e9]], dofs=["node", "mass"])
+    feedback = lqr(model.select("F_node", "mass"), displacement={"mass": 1e-6}, effort={"F_node": 1.0})
+    assert feedback.gain_error < DIGITS
+
+
 def test_equation_is_solved_without_any_start() -> None:
     """The sign of the Hamiltonian matrix needs none: the double integrator has the gains 1 and sqrt(2)."""
     problem = CareProblem(
