@@ -131,6 +131,7 @@ def test_nearly_massless_dof_is_warned_of_by_name_with_the_tolerance() -> None:
         assert exact_reduction(model, tol=tol).partition.half == ("speck",)
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 def test_warning_points_at_the_callers_line() -> None:
     """Both doors, `exact_reduction` and `mech2ss`, put the warning where the user called them."""
     model = mechss(*light_and_heavy(1e-13))

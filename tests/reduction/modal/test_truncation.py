@@ -46,6 +46,7 @@ def frame_model(share: float = 1.0, proportional: float = 1e-5) -> SecondOrderMo
     return mechss(M, C, structure.K, name="frame").select(["F_q0", "F_q61"], ["q0", "q61", "q100_dot"])
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 def test_a_frame_gets_small_and_its_error_is_what_it_says() -> None:
     """The transfer function at frequencies of one's own choice, and the slowest poles, against the full model."""
     model = frame_model()
