@@ -36,6 +36,8 @@ from support.benchmark_mechanisms import gear_train, seven_body_mechanism
 from support.benchmark_problems import intersection, mobile_manipulator, qep_with_two_infinite_eigenvalues
 from support.structures import Structure, assembly, damped_structures, null_columns, structures
 
+#: the check itself measures what python-control's evaluation loses
+pytestmark = pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 FEWER = max(10, settings().max_examples // 5)  # each example integrates step responses of all inputs
 CHANGE = 1e-6  # a broken entry must be found
 
