@@ -27,7 +27,7 @@ MANY_STATES = 200  #: from which it is measured at one frequency alone
 SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
 ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
 CURES = {
-    "dofs": 'mech2ss(model, states="scaled") (or "energy") keeps the digits, and so does',
+    "dofs": 'mech2ss(model, states="scaled") keeps the digits, as "energy" does where a model has it, and so does',
     "scaled": 'mech2ss(model, states="energy") keeps more digits where a model has such states, and so does',
 }
 

@@ -40,6 +40,8 @@ from support.verdict import (
     transfer_errors,
 )
 
+#: systems are evaluated by plain solves here, and what python-control's evaluation loses is another matter
+pytestmark = pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
 LOST = 1e-6  # the same where LostDigitsWarning was given
 FAR = 1e-10  # in the roll-off, relative to the largest entry at any frequency

@@ -18,6 +18,8 @@ from support.outcome import pairs, reduced
 from support.rational import pencil_index, rational_transfer
 from support.verdict import Improved, characteristic_error, polynomial_at, polynomial_error, transfer_errors
 
+#: systems are evaluated by plain solves here, and what python-control's evaluation loses is another matter
+pytestmark = pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 TRANSFER = 1e-8  # relative to the largest entry at each frequency
 DEEP = 1e-2  # of the largest entry at any frequency: below it, digits are counted against that
 ROLL_OFF = 1e-10  # relative to the largest entry at any frequency
