@@ -2,11 +2,13 @@
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csc_array, hstack
+from scipy.sparse.csgraph import structural_rank
 
 from halfdof_ctrl.base.arrays import ModelMatrix, as_dense
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
-LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` does not spend the time to rank W
+LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` ranks no numbers of W, but the pattern of a sparse one
 
 
 def null_column_kinds(M: ModelMatrix, C: ModelMatrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -21,6 +23,7 @@ def null_column_kinds(M: ModelMatrix, C: ModelMatrix) -> tuple[npt.NDArray[np.bo
 def split_in_words(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix) -> str:
     """Say how many DOFs are inertial, half and static, and the states that follow."""
     inertial, half = null_column_kinds(M, C)
+    insufficient = "by null columns, which do not suffice here (see exact_reduction)"
     n, n_inertial, n_half = M.shape[0], int(inertial.sum()), int(half.sum())
     kinds = f"{n_inertial} inertial, {n_half} half, {n - n_inertial - n_half} static"
     if n <= LARGEST_RANKED_REPR:
@@ -28,5 +31,15 @@ def split_in_words(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix) -> str:
         leading = np.where(inertial, M, np.where(half, C, K))
         size = np.abs(leading).max(axis=0)
         if not size.all() or np.linalg.matrix_rank(leading / size) < n:
-            return f"{kinds} by null columns, which do not suffice here (see exact_reduction)"
+            return f"{kinds} {insufficient}"
+    elif is_sparse(K) and structural_rank(_leading_columns(M, C, K, inertial, half)) < n:
+        return f"{kinds} {insufficient}"
     return f"{kinds}; {2 * n_inertial + n_half} states"
+
+
+def _leading_columns(
+    M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, inertial: npt.NDArray[np.bool_], half: npt.NDArray[np.bool_]
+) -> csc_array:
+    """Return W of a sparse model, its columns taken from M, C and K in the order of the DOFs' kinds."""
+    parts = zip((M, C, K), (inertial, half, ~(inertial | half)), strict=True)
+    return csc_array(hstack([as_sparse(matrix)[:, np.flatnonzero(kind)] for matrix, kind in parts], format="csc"))

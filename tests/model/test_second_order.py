@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
 from halfdof_ctrl.base.errors import SignalNameError
@@ -167,6 +168,18 @@ def test_structural_damping_shows_its_loss_factor() -> None:
 def test_repr_shows_the_split(model: SecondOrderModel, words: str) -> None:
     """How many DOFs of each kind, and the states that follow."""
     assert words in repr(model)
+
+
+def test_repr_of_a_large_sparse_model_knows_that_a_constraint_takes_states() -> None:
+    """600 masses tied by one rod have 1198 states, not 1200, and repr does not say otherwise."""
+    n = 600
+    stiffness = 2.0 * np.eye(n + 1) - np.eye(n + 1, k=1) - np.eye(n + 1, k=-1)
+    stiffness[n] = stiffness[:, n] = 0.0
+    free = mechss(csc_array(np.diag([1.0] * n + [0.0])), None, csc_array(stiffness + np.diag([0.0] * n + [3.0])))
+    assert "600 inertial, 0 half, 1 static; 1200 states" in repr(free)
+    stiffness[n, [10, 200]] = stiffness[[10, 200], n] = 1.0, -1.0
+    tied = mechss(csc_array(np.diag([1.0] * n + [0.0])), None, csc_array(stiffness))
+    assert "600 inertial, 0 half, 1 static by null columns, which do not suffice here" in repr(tied)
 
 
 def test_models_are_compared_by_identity() -> None:
