@@ -164,11 +164,11 @@ def truncate_modes(
     _require_band(f_max, n_modes, points)
     _require_symmetric(model)
     whole = {letter: as_sparse(getattr(model, letter)) for letter in LETTERS}
-    _require_attached(model, whole)
     parts = dict(whole)
     if model.is_complex:  # modes are those of the real part; both are projected on them
         parts |= {"K": csc_array(parts["K"].real), IMAGINARY_STIFFNESS: csc_array(parts["K"].imag)}
     motions = craig_bampton(parts, model.dofs, f_max, n_modes)
+    _require_attached(model, whole)
     top = _band_top(parts, motions.omega, f_max)
     small, basis = projected(model, parts, motions, 2.0 * np.pi * top)
     band = (top / 10.0**DECADES, top)
