@@ -27,6 +27,7 @@ REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
 SMALLEST_SIZE = 1e-140  #: of the largest entry of a column, so that the product of two has no underflow
 LARGEST_SIZE = 1e140  #: of an entry, so that the product of two does not overflow
+SIGNAL_SIZES = (1e-200, 1e200)  #: the same of B, F and D, which enter a product but once
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
@@ -110,7 +111,13 @@ def checked_square_matrices(values: Sequence[object], letters: str, rows: str = 
     return [zero_matrix(*size) if matrix is None else matrix for matrix in checked]
 
 
-def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str = "column") -> None:
+def require_range(
+    letter: str,
+    largest: FloatArray,
+    sizes: FloatArray,
+    line: str = "column",
+    limits: tuple[float, float] = (SMALLEST_SIZE, LARGEST_SIZE),
+) -> None:
     """Refuse numbers of which products overflow or vanish.
 
     Parameters
@@ -124,12 +131,15 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
         Sizes of all entries, of any shape.
     line : str
         What it is of.
+    limits : (float, float)
+        The smallest and the largest size.
 
     Raises
     ------
     MatrixError
-        One is above 1e140, or below 1e-140 but not zero; or an entry is subnormal.
+        One is above the largest size, or below the smallest but not zero; or an entry is subnormal.
     """
+    least, most = limits
     subnormal = sizes[(sizes > 0.0) & (sizes < SMALLEST_NORMAL)]
     if subnormal.size:
         msg = (
@@ -137,13 +147,13 @@ def require_range(letter: str, largest: FloatArray, sizes: FloatArray, line: str
             "reciprocal overflows. Write what is nothing as 0."
         )
         raise MatrixError(msg, matrix=letter)
-    wrong = np.flatnonzero((largest > LARGEST_SIZE) | ((largest < SMALLEST_SIZE) & (largest > 0.0)))
+    wrong = np.flatnonzero((largest > most) | ((largest < least) & (largest > 0.0)))
     if wrong.size:
         place = int(wrong[0])
         msg = (
             f"The largest entry of {line} {place} of {letter} is {largest[place]:.1e} in size, and products of such "
-            f"numbers {'overflow' if largest[place] > 1.0 else 'vanish'}: sizes from {SMALLEST_SIZE:.0e} to "
-            f"{LARGEST_SIZE:.0e} can be computed with. Choose other units, or write what is nothing as 0."
+            f"numbers {'overflow' if largest[place] > 1.0 else 'vanish'}: sizes from {least:.0e} to "
+            f"{most:.0e} can be computed with. Choose other units, or write what is nothing as 0."
         )
         raise MatrixError(msg, matrix=letter)
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import (
     MATRIX_DIMENSIONS,
+    SIGNAL_SIZES,
     DenseMatrix,
     ModelMatrix,
     checked_matrix,
@@ -207,9 +208,9 @@ def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: 
         sizes = np.abs(dense)
         by_row, by_column = (sizes.max(axis=axis) for axis in (1, 0))
     if letter[0] == "B":
-        require_range(letter, by_column, sizes)
+        require_range(letter, by_column, sizes, "column", SIGNAL_SIZES)
     else:
-        require_range(letter, by_row, sizes, "row")
+        require_range(letter, by_row, sizes, "row", SIGNAL_SIZES)
     return matrix
 
 

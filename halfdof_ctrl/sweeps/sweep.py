@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.doors import is_choice, shown
+from halfdof_ctrl.base.doors import is_choice, require_switches, shown
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
@@ -152,6 +152,8 @@ def sweep(
     >>> result.poles.imag.round(12).tolist()
     [[1.0, -1.0], [2.0, -2.0]]
     """
+    if progress is not None:
+        require_switches(progress=progress)
     processes = _checked_workers(workers, executor)
     if timeout is not None:
         processes = _checked_timeout(timeout, processes, executor)
@@ -214,6 +216,7 @@ def _planned(
     compute: Quantity | Sequence[Quantity] | None,
 ) -> _Plan:
     """Check a request and lay out the work."""
+    require_switches(paired=paired)
     quantities = _checked_quantities(compute)
     frequencies = None if omega is None else checked_frequencies(omega)
     if "response" in quantities and frequencies is None:
@@ -301,7 +304,7 @@ def _checked_workers(workers: object, executor: object) -> int | None:
         msg = "workers is the number of processes to start here, but an executor brings its own. Give one of the two."
         raise ParameterError(msg, parameter="workers", value=workers)
     if not isinstance(workers, int) or isinstance(workers, bool) or (workers < 1 and workers != EVERY_CORE):
-        msg = f"workers = {workers}, but it must be a positive number of processes, or -1 for one a core."
+        msg = f"workers = {shown(workers)}, but it must be a positive number of processes, or -1 for one a core."
         raise ParameterError(msg, parameter="workers", value=workers)
     return available_cores() if workers == EVERY_CORE else workers
 

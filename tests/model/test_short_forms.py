@@ -103,10 +103,18 @@ def test_numbers_whose_products_overflow_or_vanish_are_refused(value: float, spa
     M = np.diag([value, 1.0])
     with pytest.raises(MatrixError, match=r"overflow|vanish|subnormal"):
         hd.mechss(scipy.sparse.csr_array(M) if sparse else M, None, K)
-    with pytest.raises(MatrixError, match=r"of B is|B has an entry"):
-        hd.mechss(np.eye(2), None, K, [value, 0.0])
     with pytest.raises((MatrixError, WeightError), match=r"overflow|vanish|subnormal"):
         hd.lqr(hd.mechss(np.eye(2), None, K), Q=np.eye(4), R=abs(value))
+
+
+@pytest.mark.parametrize("value", [1e308, -1e201, 5e-324, 1e-310, 1e-201])
+def test_signals_take_the_squares_of_such_numbers(value: float) -> None:
+    """Inputs and outputs enter a product but once."""
+    with pytest.raises(MatrixError, match=r"of B is|B has an entry"):
+        hd.mechss(np.eye(2), None, K, [value, 0.0])
+    with pytest.raises(MatrixError, match=r"of F is|F has an entry"):
+        hd.mechss(np.eye(2), None, K, None, [value, 0.0])
+    assert hd.mechss(np.eye(2), None, K, [1e150, 0.0]).B[0, 0] == 1e150
 
 
 @pytest.mark.parametrize("value", [1e-150, 1e-30, 1e30])
