@@ -146,6 +146,25 @@ def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[st
             f"{len(names)} names were given for {count} {what}: {listed([str(name) for name in names])}. Name each one."
         )
         raise SignalNameError(msg, names=tuple(str(name) for name in names))
+    if not _is_plain(names):
+        _require_sound(names, what)
+    if len(set(names)) != count:
+        twice = _duplicates(names)
+        msg = f"Names of {what} must differ, but {listed(twice)} stands more than once. Rename all but one."
+        raise SignalNameError(msg, names=twice)
+    return names
+
+
+def _is_plain(names: tuple[str, ...]) -> bool:
+    """Tell by all names at once that none is empty, holds blanks or anything that cannot be printed."""
+    if not set(map(type, names)) <= {str} or not all(names):
+        return False
+    joined = "".join(names)
+    return joined.isprintable() and " " not in joined
+
+
+def _require_sound(names: tuple[str, ...], what: str) -> None:
+    """Refuse names that are no text, and those with blanks at their ends or control characters."""
     if not all(isinstance(name, str) and name.strip() == name and name for name in names):
         bad = [repr(name) for name in names if not (isinstance(name, str) and name.strip() == name and name)]
         msg = f"Names of {what} must be non-empty text without blanks at the ends, not {listed(bad)}."
@@ -154,11 +173,6 @@ def checked_names(given: str | Sequence[str], count: int, what: str) -> tuple[st
     if odd:
         msg = f"Names of {what} hold control characters, which terminals and tables obey: {listed(odd)}. Rename them."
         raise SignalNameError(msg, names=tuple(odd))
-    if len(set(names)) != count:
-        twice = _duplicates(names)
-        msg = f"Names of {what} must differ, but {listed(twice)} stands more than once. Rename all but one."
-        raise SignalNameError(msg, names=twice)
-    return names
 
 
 def _acts_on_a_terminal(text: str) -> bool:

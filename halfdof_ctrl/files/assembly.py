@@ -190,15 +190,12 @@ def _aligned(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[Matrices, t
     names = {letter: _names_of(found, letter, raw, longest) for letter, raw in raws.items()}
     order = [letter for letter in ORDER if letter in raws]
     labelled = [letter for letter in order if names[letter] is not None]
-    union: dict[str, int] = {}
-    for letter in labelled:
-        for name in names[letter] or ():
-            union.setdefault(name, len(union))
+    every = _union([names[letter] or () for letter in labelled])
     open_sizes = [raw.matrix.shape[0] for letter, raw in raws.items() if names[letter] is None]
-    n = len(union) or max(open_sizes)
+    n = len(every) or max(open_sizes)
     square: Matrices = {}
     notes = _require_one_count(found, raws, names)
-    every = tuple(union)
+    union: dict[str, int] = {}
     for letter in order:
         matrix, own = raws[letter].matrix, names[letter]
         if own is None:
@@ -214,9 +211,17 @@ def _aligned(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[Matrices, t
         elif own == every:
             square[letter] = matrix
         else:
+            union = union or dict(zip(every, range(n), strict=True))
             square[letter] = _moved(matrix, np.array([union[name] for name in own]), n)
     notes += _differences(names, labelled)
     return {letter: square[letter] for letter in ("M", "C", "K", "S") if letter in square}, every or None, notes
+
+
+def _union(labels: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """Join the names of all matrices, which mostly have the same."""
+    first = labels[0] if labels else ()
+    others = [own for own in labels if own != first]
+    return tuple(dict.fromkeys([*first, *[name for own in others for name in own]])) if others else first
 
 
 def _require_one_count(
@@ -271,8 +276,9 @@ def _sizes_differ(found: Sources, raws: Mapping[str, RawMatrix]) -> FileFormatEr
 def _differences(names: Mapping[str, tuple[str, ...] | None], labelled: Sequence[str]) -> list[str]:
     """Tell which DOFs only some of the matrices have."""
     notes = []
-    first = set(names[labelled[0]] or ()) if labelled else set()
-    for letter in labelled[1:]:
+    others = [letter for letter in labelled[1:] if names[letter] != names[labelled[0]]]
+    first = set(names[labelled[0]] or ()) if others else set()
+    for letter in others:
         own = names[letter] or ()
         extra = [name for name in own if name not in first]
         if extra:

@@ -17,7 +17,7 @@ from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.files.definiteness import Inertia, inertia
 from halfdof_ctrl.files.formats.digits import digits_in_words
-from halfdof_ctrl.files.formats.labels import TRANSLATIONS, direction_of
+from halfdof_ctrl.files.formats.labels import translations
 from halfdof_ctrl.files.formats.raw_matrix import Storage
 
 SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
@@ -189,7 +189,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
     """
     real = csc_array(matrix.real)
     largest_entry = float(np.abs(matrix.data).max(initial=0.0))
-    difference, total = abs(matrix - matrix.T), abs(matrix + matrix.T)
+    difference = abs(matrix - matrix.T)
     scale = largest_entry or 1.0
     return MatrixReport(
         letter=letter,
@@ -198,7 +198,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
         nonzero=int(matrix.nnz),
         is_complex=bool(np.iscomplexobj(matrix.data)),
         asymmetry=float(difference.max()) / scale if difference.nnz else 0.0,
-        skew=bool(difference.nnz) and float(total.max() if total.nnz else 0.0) <= SYMMETRIC * scale,
+        skew=bool(difference.nnz) and float(abs(matrix + matrix.T).max()) <= SYMMETRIC * scale,
         null_columns=int(np.count_nonzero(~has_entries(matrix))),
         inertia=inertia(real, largest, found.get("known_to", EPS)),
         **found,
@@ -220,10 +220,8 @@ def mass_per_direction(mass: csc_array | None, dofs: Sequence[str]) -> dict[str,
     """
     if mass is None:
         return {}
-    directions = np.array([direction_of(name) or "" for name in dofs])
     sums = {}
-    for direction in TRANSLATIONS:
-        chosen = (directions == direction).astype(np.float64)
+    for direction, chosen in translations(dofs).items():
         if chosen.any():
             sums[direction] = float(np.real(chosen @ (mass @ chosen)))
     return sums

@@ -77,7 +77,7 @@ def aligned_signals(found: Sources, names: Sequence[str], *, labelled: bool) -> 
         A matrix that does not fit the DOFs.
     """
     n = len(names)
-    places = {name: index for index, name in enumerate(names)} if labelled else {}
+    places = {name: index for index, name in enumerate(names)} if labelled and found.signals else {}
     signals: dict[str, Any] = {}
     notes: list[str] = []
     for letter, source in found.signals.items():

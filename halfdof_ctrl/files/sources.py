@@ -237,7 +237,8 @@ def _read(path: Path, content: bytes, room: int, *, is_signal: bool) -> list[Raw
         msg = "the last number has fewer digits than those before it. The file is cut short: write or copy it anew."
         raise FileFormatError(msg, path="")
     doubts = () if content.endswith((b"\n", b"\r")) else (NO_LAST_LINE_END,)
-    if path.suffix.lower() in LABEL_ENDINGS or (dmig.has_extrn(content) and not dmig.has_dmig(content)):
+    names_rows = path.suffix.lower() in LABEL_ENDINGS
+    if names_rows or (_may_be_deck(content) and not dmig.has_dmig(content) and dmig.has_extrn(content)):
         return _read_labels(path, content)
     if output4.is_binary_output4(content) or output4.is_text_output4(content) or path.suffix.lower() == ".op4":
         return output4.read_output4(content, room)
@@ -254,7 +255,7 @@ def _read_text(path: Path, content: bytes, room: int, *, is_signal: bool) -> lis
     foreign = foreign_kind(path, content)
     if foreign is None and suffix in calculix.KIND_BY_ENDING and table.is_table(content):
         return [calculix.read_calculix(content, suffix, room)]
-    if dmig.has_dmig(content):
+    if _may_be_deck(content) and dmig.has_dmig(content):
         return dmig.read_dmig(content)
     if content.lstrip().startswith(b"*") and abaqus.data_columns(content):
         return [abaqus.read_abaqus(content, room)]
@@ -266,6 +267,17 @@ def _read_text(path: Path, content: bytes, room: int, *, is_signal: bool) -> lis
         "a table of numbers. The file is none of these, or damaged at its start."
     )
     raise FileFormatError(msg, path="")
+
+
+def _may_be_deck(content: bytes) -> bool:
+    """Return whether entries of Nastran may stand somewhere, which a large table need not be searched for."""
+    return not (
+        abaqus.data_columns(content)
+        or harwell_boeing.is_harwell_boeing(content)
+        or matrix_market.is_matrix_market(content)
+        or output4.is_binary_output4(content)
+        or output4.is_text_output4(content)
+    )
 
 
 def _read_labels(path: Path, content: bytes) -> tuple[str, ...]:

@@ -1,9 +1,9 @@
 """Measure the import of labelled finite-element models over their size, for every reader with labels.
 
 Run ``python tests/benchmarks/imports.py [LARGEST]`` on a quiet machine. A chain of n DOFs with stiffness and mass is
-written in each format; the table shows the time of `load_model`, how it grows when n doubles, and for text its ratio to
-the time of reading the numbers alone (`numpy.loadtxt` of the same files; for fields of fixed width, of the fields cut
-out). Nothing is asserted: times depend on the machine.
+written in each format; the table shows the time of `load_model`, how it grows when n doubles, and its ratio to the time
+of reading the numbers alone (`numpy.loadtxt` of the same files; for fields of fixed width, of the fields cut out; for
+binary records, of one record after the other). Nothing is asserted: times depend on the machine.
 """
 
 import io
@@ -22,6 +22,7 @@ import halfdof_ctrl as hd
 
 LARGEST = 500_000
 DOUBLINGS = 3
+SMALL = 100
 PER_NODE = 1
 Entries = tuple[np.ndarray, np.ndarray, np.ndarray]
 
@@ -94,7 +95,18 @@ def output4(folder: Path, n: int) -> list[Path]:
         for node in range(1, n + 1):
             stream.write(f"{node:8d}{1:8d}" + ("\n        " if node % 4 == 0 else ""))
         stream.write("\n")
-    return [path]
+    return [path, folder / "job.pch"]
+
+
+def matrix_market(folder: Path, n: int) -> list[Path]:
+    """Write row, column and value of the lower triangle."""
+    paths = []
+    for letter, (rows, columns, values) in chain(n):
+        paths.append(folder / f"job_{letter}.mtx")
+        lines = [f"{i} {j} {v:.15e}\n" for i, j, v in zip(rows, columns, values, strict=True)]
+        head = f"%%MatrixMarket matrix coordinate real symmetric\n{n} {n} {rows.size}\n"
+        paths[-1].write_text(head + "".join(lines))
+    return paths
 
 
 def harwell_boeing(folder: Path, n: int) -> list[Path]:
@@ -124,6 +136,7 @@ WRITERS: dict[str, Callable[[Path, int], list[Path]]] = {
     "DMIG": punch,
     "OUTPUT4 + EXTRN": output4,
     "Harwell-Boeing + mapping": harwell_boeing,
+    "Matrix Market": matrix_market,
 }
 
 
@@ -132,6 +145,16 @@ def numbers_alone(path: Path) -> None:
     content = path.read_bytes()
     if path.suffix == ".matrix":
         np.array(content.split(b"\n", 4)[4].split(), dtype=np.float64)
+    elif path.suffix == ".op4":
+        place = 0
+        while place < len(content):
+            (length,) = struct.unpack_from("<i", content, place)
+            np.frombuffer(content, np.float64, max(length - 20, 0) // 8, min(place + 24, len(content)))
+            place += length + 8
+    elif content.startswith(b"%%Matrix"):
+        np.loadtxt(io.BytesIO(content), comments="%")
+    elif content.startswith(b"EXTRN"):
+        np.array(content[8:].split(), dtype=np.float64)
     elif path.suffix == ".pch":
         np.array([line[-16:] for line in content.split(b"\n") if line.startswith(b"*")], dtype=np.float64)
     else:
@@ -151,14 +174,15 @@ def main(largest: int) -> None:
     print(f"{'format':26s}{'DOFs':>10s}{'load_model [s]':>16s}{'growth':>8s}{'of reading alone':>18s}")
     for name, write in WRITERS.items():
         before = 0.0
-        for n in [largest // 2**k for k in range(DOUBLINGS, -1, -1)]:
+        for n in [SMALL, *[largest // 2**k for k in range(DOUBLINGS, -1, -1)]]:
             with tempfile.TemporaryDirectory() as folder:
                 paths = write(Path(folder), n)
-                texts = [path for path in paths if path.suffix != ".op4"]
-                alone = sum(seconds(partial(numbers_alone, path)) for path in texts)
+                alone = sum(seconds(partial(numbers_alone, path)) for path in paths)
                 spent = seconds(partial(hd.load_model, paths[0]))
+            if n == SMALL:  # loads the modules
+                continue
             growth = f"{spent / before:8.2f}" if before else " " * 8
-            print(f"{name:26s}{n:10d}{spent:16.2f}{growth}" + (f"{spent / alone:18.1f}" if texts else ""), flush=True)
+            print(f"{name:26s}{n:10d}{spent:16.2f}{growth}{spent / alone:18.1f}", flush=True)
             before = spent
 
 

@@ -24,7 +24,7 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
-from halfdof_ctrl.files.formats.labels import dof_names
+from halfdof_ctrl.files.formats.labels import distinct, dof_names
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, Declared, RawMatrix, assembled, completed
 from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 
@@ -143,7 +143,7 @@ def _labelled(table: FloatArray, declared: Declared) -> RawMatrix:
         msg = "a node or DOF label is out of range. The file is damaged."
         raise FileFormatError(msg, path="")
     rows, columns = _keys(labels[:, 0], labels[:, 1]), _keys(labels[:, 2], labels[:, 3])
-    known = np.union1d(rows, columns)
+    known = distinct(rows, columns)
     return assembled(
         np.searchsorted(known, rows),
         np.searchsorted(known, columns),

@@ -9,8 +9,6 @@ Constrained DOFs are not in the files. Source: CalculiX CrunchiX User's Manual, 
 
 import re
 
-import numpy as np
-
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
@@ -20,6 +18,7 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
 LABEL = re.compile(rb"(\d{1,10})\.(\d{1,2})")
+MOST_DIGITS = 10  #: of a node
 COLUMNS = 3
 
 
@@ -79,11 +78,28 @@ def read_dofs(content: bytes) -> tuple[str, ...]:
     ('n5_u1', 'n5_u3', 'n60_u2')
     """
     lines = content.split()
+    return _plain_dofs(lines) or _dofs_by_line(lines)
+
+
+def _dofs_by_line(lines: list[bytes]) -> tuple[str, ...]:
+    """Read the names one by one, with the line that is wrong."""
     found = [LABEL.fullmatch(line) for line in lines]
     wrong = next((number for number, match in enumerate(found, start=1) if match is None), 0)
     if wrong or not lines:
         shown = lines[wrong - 1][:60].decode("latin-1") if lines else ""
         msg = f"a node and its DOF belong into each line, as 5.1, not {shown!r}. The file is damaged."
         raise FileFormatError(msg, path="", line=wrong or 1)
-    labels = np.array([(int(match[1]), int(match[2])) for match in found if match], dtype=np.int64)
-    return dof_names(labels[:, 0].tolist(), labels[:, 1].tolist())
+    return dof_names([int(match[1]) for match in found if match], [int(match[2]) for match in found if match])
+
+
+def _plain_dofs(lines: list[bytes]) -> tuple[str, ...] | None:
+    """Read names that all are a node, a point and one digit, None if they are not."""
+    nodes, endings = b" ".join([line[:-2] for line in lines]), b"".join([line[-2:] for line in lines])
+    components = endings[1::2]
+    plain = len(endings) == 2 * len(lines) > 0 and endings[::2] == b"." * len(lines) and components.isdigit()
+    fields = nodes.split()
+    if not plain or len(fields) != len(lines) or not b"".join(fields).isdigit():
+        return None
+    if max(map(len, fields)) > MOST_DIGITS:
+        return None
+    return dof_names([int(field) for field in fields], [component - ord("0") for component in components])

@@ -9,14 +9,13 @@ import re
 
 from halfdof_ctrl.base.arrays import EPS
 
-SAMPLE = 2**17  #: bytes at the start and at the end that are looked at; a file has one format
+SAMPLE = 2**16  #: bytes at the start and at the end that are looked at; a file has one format
 NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
 FULL_DIGITS = 16  #: digits from which numbers are as good as float64
 SURE = 6  #: digits from which few numbers of full length tell a format
 FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
 FEWEST_DIGITS = 4  #: digits of the shortest format that is believed,
 MANY, MOST = 8, 0.5  #: and numbers of full length, and their share, that it takes
-MOST_NUMBERS = 20_000
 SINGLE_ROUNDING = 2.0**-24  #: rounding of four-byte numbers
 
 
@@ -29,11 +28,7 @@ def digits_of(content: bytes) -> int | None:
     (6, None, None)
     """
     sample = content if len(content) <= 2 * SAMPLE else content[:SAMPLE] + b" " + content[-SAMPLE:]
-    mantissas: set[bytes] = set()
-    for match in NUMBER.finditer(sample):
-        mantissas.add((match[1] or match[2]).replace(b".", b"").strip(b"0"))
-        if len(mantissas) >= MOST_NUMBERS:
-            break
+    mantissas = {(real or whole).replace(b".", b"").strip(b"0") for real, whole in NUMBER.findall(sample)}
     lengths = [len(mantissa) for mantissa in mantissas if mantissa]
     longest = max(lengths, default=0)
     full = lengths.count(longest)

@@ -21,8 +21,8 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
-from halfdof_ctrl.files.formats.dmig_punch import COMPONENT_BITS, MOST_COMPONENT, punched_matrices
-from halfdof_ctrl.files.formats.labels import dof_names
+from halfdof_ctrl.files.formats.dmig_punch import COMPONENT_BITS, MOST_COMPONENT, extrn_labels, punched_matrices
+from halfdof_ctrl.files.formats.labels import distinct, dof_names
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import printable
 
@@ -82,6 +82,10 @@ def has_extrn(content: bytes) -> bool:
     return _has_word(content, b"EXTRN") and EXTRN.search(content) is not None
 
 
+def _includes(content: bytes) -> bool:
+    return _has_word(content, b"INCLUDE") and INCLUDE.search(content) is not None
+
+
 def _has_word(content: bytes, word: bytes) -> bool:
     """Look for a word in its usual capitals, which is far faster than a pattern that ignores them."""
     return any(form in content for form in (word, word.lower(), word.capitalize()))
@@ -103,9 +107,10 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     """
     found = _punched(content) or _line_by_line(content)
     square = [entries for entries in found if entries.form in SQUARE_FORMS and entries.rows.size]
-    doubts = ("has INCLUDE statements, which are not followed",) if INCLUDE.search(content) else ()
+    doubts = ("has INCLUDE statements, which are not followed",) if _includes(content) else ()
     rounding = known_to(content)
-    matrices = [_assembled(entries, doubts, rounding) for entries in square]
+    names: dict[bytes, tuple[str, ...]] = {}  # of matrices before, most of which have the same DOFs
+    matrices = [_assembled(entries, doubts, rounding, names) for entries in square]
     if not matrices:
         what = ", ".join(dict.fromkeys([entries.name for entries in found])) or "none"
         msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
@@ -160,6 +165,11 @@ def read_extrn(content: bytes) -> tuple[str, ...]:
     >>> read_extrn(b"EXTRN          3   12346    1001       0\n")
     ('n3_u1', 'n3_u2', 'n3_u3', 'n3_r1', 'n3_r3', 'n1001')
     """
+    return dof_names(*(extrn_labels(content) or _extrn_by_line(content)))
+
+
+def _extrn_by_line(content: bytes) -> tuple[list[int], list[int]]:
+    """Read nodes and components of any layout, with the line that is wrong."""
     nodes: list[int] = []
     components: list[int] = []
     for fields, line in _bulk_entries(content, "EXTRN"):
@@ -174,7 +184,7 @@ def read_extrn(content: bytes) -> tuple[str, ...]:
     if not nodes:
         msg = "no EXTRN entry in it, which names the rows of OUTPUT4 matrices."
         raise FileFormatError(msg, path="")
-    return dof_names(nodes, components)
+    return nodes, components
 
 
 def _opened(name: str, fields: list[str]) -> _Entries:
@@ -224,11 +234,16 @@ def _real(text: str) -> float:
     return value
 
 
-def _assembled(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> RawMatrix:
-    known = np.union1d(entries.rows, entries.columns)
+def _assembled(
+    entries: _Entries, doubts: tuple[str, ...], rounding: float, names: dict[bytes, tuple[str, ...]]
+) -> RawMatrix:
+    known = distinct(entries.rows, entries.columns)
     values = entries.values
     declared: Declared = "symmetric" if entries.form == SYMMETRIC else "general"
     nodes, components = known >> COMPONENT_BITS, known & (2**COMPONENT_BITS - 1)
+    labels = known.tobytes()
+    if labels not in names:
+        names[labels] = dof_names(nodes.tolist(), components.tolist())
     return assembled(
         np.searchsorted(known, entries.rows),
         np.searchsorted(known, entries.columns),
@@ -238,7 +253,7 @@ def _assembled(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> R
         format=f"Nastran DMIG, form {entries.form}",
         title=entries.name,
         named=True,
-        dofs=dof_names(nodes.tolist(), components.tolist()),
+        dofs=names[labels],
         doubts=doubts,
         known_to=rounding,
     )

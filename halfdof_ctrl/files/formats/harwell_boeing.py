@@ -22,7 +22,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
-from halfdof_ctrl.files.formats.labels import WORD, ansys_name
+from halfdof_ctrl.files.formats.labels import WORD, ansys_ending, ansys_name
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled, most_rows
 from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, LONGEST_LINE, Lines, fixed_width, printable, whole_numbers
 
@@ -114,6 +114,11 @@ def read_mapping(content: bytes) -> tuple[str, ...]:
     >>> read_mapping(b"  Matrix Eqn   Node   DOF\n  1   7   UX  \n  2   7   ROTZ\n")
     ('n7_u1', 'n7_r3')
     """
+    return _plain_mapping(content) or _mapping_by_line(content)
+
+
+def _mapping_by_line(content: bytes) -> tuple[str, ...]:
+    """Read the names one by one, with the line that is wrong."""
     names: dict[int, str] = {}
     for number, line in enumerate(content.split(b"\n"), start=1):
         fields = line.decode("latin-1").split()
@@ -129,6 +134,26 @@ def read_mapping(content: bytes) -> tuple[str, ...]:
         msg = f"{len(names)} equations that are not numbered from 1 on. The mapping file is damaged or cut short."
         raise FileFormatError(msg, path="")
     return tuple([names[equation] for equation in range(1, len(names) + 1)])
+
+
+def _plain_mapping(content: bytes) -> tuple[str, ...] | None:
+    """Read a mapping whose rows number the equations in order, None if anything else about it is unusual."""
+    rows = content[content.find(b"\n") + 1 :]
+    fields = rows.split()
+    first = rows.split(b"\n", 1)[0].split()
+    count, rest = divmod(len(fields), MAPPING_FIELDS)
+    if rest or not count or len(first) != MAPPING_FIELDS or content.split(b"\n", 1)[0].split()[:1] != [b"Matrix"]:
+        return None
+    equations, nodes, labels = (fields[place::MAPPING_FIELDS] for place in range(MAPPING_FIELDS))
+    endings = {label: ansys_ending(label.decode("latin-1")) for label in set(labels)}
+    if not all(WORD.match(label.decode("latin-1")) for label in endings):
+        return None
+    if equations != [b"%d" % number for number in range(1, count + 1)] or not b"".join(nodes).isdigit():
+        return None
+    places = rows.count(b"\n") - rows.count(b"\n\n") + (not rows.endswith(b"\n"))
+    if places != count:  # rows of other lengths that make up for each other
+        return None
+    return tuple([f"n{int(node)}_{endings[label]}" for node, label in zip(nodes, labels, strict=True)])
 
 
 def _header(lines: Lines, length: int) -> _Header:

@@ -16,7 +16,6 @@ Source: MSC Nastran DMAP Programmer's Guide, module OUTPUT4.
 """
 
 import re
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -26,19 +25,24 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.columns import runs
 from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING, known_to
+from halfdof_ctrl.files.formats.output4_binary import (
+    CUT,
+    DAMAGED,
+    RECORD_MARK,
+    BinaryWords,
+    binary_strings,
+)
 from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of_form, meant_by_form
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
 
 COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
-RECORD_MARK = 4  #: bytes of a record's length
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
 NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
-CUT = "it ends within a matrix. The file is cut short."
-DAMAGED = "The file is damaged."
 
 
 @dataclass(slots=True)
@@ -98,16 +102,6 @@ class _Matrix:
         )
 
 
-def runs(starts: npt.NDArray[np.int64], lengths: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
-    """Join runs of consecutive numbers.
-
-    >>> runs(np.array([5, 1]), np.array([2, 3])).tolist()
-    [5, 6, 1, 2, 3]
-    """
-    before = np.cumsum(lengths) - lengths
-    return np.asarray(np.arange(int(lengths.sum())) + np.repeat(starts - before, lengths))
-
-
 def is_binary_output4(content: bytes) -> bool:
     """Tell by the count of bytes of the first header."""
     return _byte_order(content) is not None
@@ -159,38 +153,24 @@ def _byte_order(content: bytes) -> str | None:
 
 
 def _binary_matrices(content: bytes, order: str, room: int) -> Iterator[RawMatrix]:
-    records = _records(content, order)
-    for start, stop in records:
-        word = HEADER_BYTES.get(stop - start)
+    words = BinaryWords(content, order)
+    place = 0
+    while place < len(words.quarters):
+        start, stop = words.record(place)
+        word = HEADER_BYTES.get(RECORD_MARK * (stop - start))
         if word is None:
-            msg = f"a record of {stop - start} bytes where a header should be. {DAMAGED}"
+            msg = f"a record of {RECORD_MARK * (stop - start)} bytes where a header should be. {DAMAGED}"
             raise FileFormatError(msg, path="")
-        integer = np.dtype(f"{order}i{word}")
-        name = printable(_joined_name(content[start + 4 * word : stop], word))
-        matrix = _opened(tuple(np.frombuffer(content, integer, 4, start).tolist()), name, room)
+        numbers = tuple([words.integer(start, number, word) for number in range(4)])
+        title = content[RECORD_MARK * start + 4 * word : RECORD_MARK * stop]
+        matrix = _opened(numbers, printable(_joined_name(title, word)), room)
         real = np.dtype(f"{order}f8" if matrix.type in DOUBLE_TYPES else f"{order}f{word}")
-        places: list[int] = []
-        for begin, end in records:
-            if end - begin < 3 * word:
-                msg = f"a record of {end - begin} bytes where a column should be. {DAMAGED}"
-                raise FileFormatError(msg, path="")
-            column, row, words = np.frombuffer(content, integer, 3, begin).tolist()
-            if column > matrix.shape[1]:
-                break
-            if words * word != end - begin - 3 * word:
-                size = f"{words} words, but its record has {end - begin} bytes"
-                msg = f"column {column} of {matrix.name} says {size}. {DAMAGED}"
-                raise FileFormatError(msg, path="")
-            data = begin + 3 * word
-            if row > 0:
-                _note(matrix, places, (column, row, words), (data, word, real.itemsize))
-            else:
-                numbers = np.frombuffer(content, integer, words, data).tolist()
-                _sparse_column(matrix, places, (column, numbers), (data, word, real.itemsize))
-        else:
-            raise FileFormatError(CUT, path="")
+        strings = binary_strings(words, stop + 1, matrix, (word, real.itemsize))
+        matrix.rows, matrix.columns, matrix.counts = strings.rows, strings.columns, strings.counts
         rounding = SINGLE_ROUNDING if real.itemsize == RECORD_MARK else EPS
-        yield matrix.finished(_gathered(content, matrix, places, real), "binary", rounding)
+        yield matrix.finished(words.values(strings, real, matrix.per_value), "binary", rounding)
+        place = strings.stop
+    words.require_whole()
 
 
 def _joined_name(field: bytes, word: int) -> bytes:
@@ -203,64 +183,6 @@ def _joined_name(field: bytes, word: int) -> bytes:
     if word == RECORD_MARK or any(half[RECORD_MARK:].strip(b" \0") for half in halves):
         return field
     return b"".join([half[:RECORD_MARK] for half in halves])
-
-
-def _records(content: bytes, order: str) -> Iterator[tuple[int, int]]:
-    """Return where records begin and end, each of which stands between two equal counts of its bytes."""
-    mark = struct.Struct(f"{order}I")
-    place = 0
-    while place < len(content):
-        stop = place + RECORD_MARK + mark.unpack(content[place : place + RECORD_MARK].ljust(RECORD_MARK, b"\0"))[0]
-        closing = content[stop : stop + RECORD_MARK]
-        if len(closing) < RECORD_MARK:
-            raise FileFormatError(CUT, path="")
-        if closing != content[place : place + RECORD_MARK] or (stop - place) % RECORD_MARK:
-            msg = f"the record at byte {place} does not end as it begins. {DAMAGED}"
-            raise FileFormatError(msg, path="")
-        yield place + RECORD_MARK, stop
-        place = stop + RECORD_MARK
-
-
-def _sparse_column(
-    matrix: _Matrix, places: list[int], words: tuple[int, list[int]], sizes: tuple[int, int, int]
-) -> None:
-    """Follow the strings of a column through its words."""
-    column, numbers = words
-    data, word, real = sizes
-    place = 0
-    while place < len(numbers):
-        if matrix.big:
-            length, row = numbers[place], numbers[place + 1] if place + 1 < len(numbers) else 0
-            place += 2
-        else:
-            length, row = numbers[place] >> 16, numbers[place] & 0xFFFF
-            place += 1
-        if length < 1 or place + length - 1 > len(numbers):
-            msg = f"a string of {length} words in column {column} of {matrix.name}. {DAMAGED}"
-            raise FileFormatError(msg, path="")
-        _note(matrix, places, (column, row, length - 1), (data + place * word, word, real))
-        place += length - 1
-
-
-def _note(matrix: _Matrix, places: list[int], where: tuple[int, int, int], sizes: tuple[int, int, int]) -> None:
-    """Note a string of words at a byte of the file."""
-    column, row, words = where
-    data, word, real = sizes
-    count, rest = divmod(words * word, real * matrix.per_value)
-    if rest:
-        msg = f"{words} words in column {column} of {matrix.name} are no whole values. {DAMAGED}"
-        raise FileFormatError(msg, path="")
-    matrix.add(column, row, count)
-    places.append(data)
-
-
-def _gathered(content: bytes, matrix: _Matrix, places: list[int], real: np.dtype[Any]) -> npt.NDArray[np.float64]:
-    """Take the values of all strings out of the file at once; records lie on multiples of four bytes."""
-    quarters = np.frombuffer(content, "u4", len(content) // RECORD_MARK)
-    per_value = real.itemsize * matrix.per_value // RECORD_MARK
-    lengths = np.array(matrix.counts, dtype=np.int64) * per_value
-    chosen = quarters[runs(np.array(places, dtype=np.int64) // RECORD_MARK, lengths)]
-    return chosen.view(real).astype(np.float64)
 
 
 def _text_matrices(lines: Lines, room: int) -> Iterator[RawMatrix]:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl.base.names import checked_dofs
-from halfdof_ctrl.files.formats.labels import ansys_name, direction_of, dof_names
+from halfdof_ctrl.files.formats.labels import ansys_name, dof_names, translations
 
 LABELS = st.sets(st.tuples(st.integers(-9, 2**31 - 1), st.integers(0, 20)), min_size=1, max_size=40)
 
@@ -33,4 +33,5 @@ def test_other_labels_keep_their_word() -> None:
 def test_only_translations_of_nodes_have_a_direction() -> None:
     """The mass per direction sums over these."""
     names = ("n1_u1", "n1_u3", "n1_r1", "n1", "internal1_1", "u1", "q_u1")
-    assert [direction_of(name) for name in names] == ["u1", "u3", None, None, None, None, None]
+    found = {direction: which.tolist() for direction, which in translations(names).items()}
+    assert found == {"u1": [1.0, *[0.0] * 6], "u2": [0.0] * 7, "u3": [0.0, 1.0, *[0.0] * 5]}
