@@ -21,7 +21,10 @@ def table(fields: list[str]) -> np.ndarray:
 
 
 @given(
-    lines=st.lists(TEXT, max_size=6), start=st.integers(0, 4), width=st.integers(1, 6), end=st.sampled_from(["\n", ""])
+    lines=st.lists(TEXT, max_size=6),
+    start=st.integers(0, 4),
+    width=st.integers(1, 6),
+    end=st.sampled_from(["\n", ""]),
 )
 def test_fields_are_cut_as_by_slices(lines: list[str], start: int, width: int, end: str) -> None:
     """Whatever the lengths and ends of lines; what is missing is blank."""
