@@ -5,13 +5,13 @@ Frequencies are worked from coarse to fine, so that what is done when the user s
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import InterruptedResponseWarning, give_warning
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.data_limit import warn_of_data
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
-from halfdof_ctrl.model.refinement import DataLimit
+from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer, require_room
 
@@ -54,7 +54,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
     """
     p, m = model.D.shape
     require_room(p, m, frequencies.size)
-    transfer = SparseTransfer(*model.quadratics)
+    transfer = SparseTransfer(*model.quadratics, bounded_above=SUSPECT_GROWTH * EPS / model.known_to)
     values = np.empty((p, m, frequencies.size), dtype=np.complex128)
     limit = DataLimit.none(values.shape)
     done = np.zeros(frequencies.size, dtype=bool)
@@ -75,7 +75,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
         give_warning(msg, InterruptedResponseWarning)
         values, frequencies = values[:, :, done], frequencies[done]
         limit = DataLimit(limit.data[:, :, done], limit.slope[:, :, done])
-    warn_of_data(model, frequencies, values, limit, frequencies.size)
+    warn_of_data(model, frequencies, values, limit.of_entries_known_to(model.known_to), frequencies.size)
     return values, frequencies
 
 

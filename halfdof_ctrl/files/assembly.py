@@ -14,9 +14,9 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, issparse
 
 from halfdof_ctrl.base.arrays import EPS, Matrix
+from halfdof_ctrl.base.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Triangle, with_triangle
 from halfdof_ctrl.files.import_report import (
     PENALTY,

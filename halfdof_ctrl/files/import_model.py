@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.base.doors import is_choice, require_path, shown
 from halfdof_ctrl.base.errors import (
     FileFormatError,
@@ -20,7 +21,6 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.base.names import checked_names
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
 from halfdof_ctrl.files.containers import PathLike, single_text, texts
-from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_report import ImportReport
 from halfdof_ctrl.files.naming import naming_the_file

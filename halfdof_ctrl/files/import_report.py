@@ -14,9 +14,9 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.definiteness import Inertia, inertia
+from halfdof_ctrl.base.digits import digits_in_words
 from halfdof_ctrl.base.names import listed, removal_of
-from halfdof_ctrl.files.definiteness import Inertia, inertia
-from halfdof_ctrl.files.formats.digits import digits_in_words
 from halfdof_ctrl.files.formats.labels import translations
 from halfdof_ctrl.files.formats.raw_matrix import Storage
 
@@ -59,7 +59,12 @@ class MatrixReport:
         known = self.inertia.rank
         rounded = self.letter == "K" and self.known_to > EPS and not self.inertia.negative
         motions = self.inertia.zero if rounded else 0
-        words = f", {motions} zero to the file's {digits_in_words(self.known_to)}: rigid-body motions"
+        lowest = self.inertia.lowest
+        sign = f"negative by {-lowest:.0e}, " if lowest is not None and lowest < 0.0 else ""
+        words = (
+            f", {motions} zero to the file's {digits_in_words(self.known_to)} ({sign}which is the rounding of such a "
+            "file): rigid-body motions, or softer than it tells"
+        )
         digits = words if motions else ""
         part = "" if self.asymmetry <= SYMMETRIC and not self.is_complex else " (of the symmetric real part)"
         return self.inertia.in_words + part + ("" if known is None else f", rank {known}") + digits

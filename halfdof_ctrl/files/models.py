@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, is_zero
+from halfdof_ctrl.base.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.files.containers import PathLike
-from halfdof_ctrl.files.definiteness import LARGEST_COMPONENT
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
 from halfdof_ctrl.files.import_model import Paths, import_model, import_report
 from halfdof_ctrl.files.import_report import ImportReport

@@ -15,10 +15,10 @@ import numpy as np
 from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.arrays import EPS, checked_matrix
+from halfdof_ctrl.base.digits import SINGLE_ROUNDING
 from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
-from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
 from halfdof_ctrl.files.formats.variables import PLANE, Variable, another_kind
 

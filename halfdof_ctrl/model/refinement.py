@@ -32,6 +32,10 @@ class DataLimit:
         """Start from nothing."""
         return cls(np.zeros(shape), np.zeros(shape))
 
+    def of_entries_known_to(self, known_to: float) -> "DataLimit":
+        """Return the limit for entries that are not known to their last digit, but to those of a file."""
+        return DataLimit(self.data * (known_to / EPS), self.slope)
+
 
 def refined(
     exact: ExactPolynomial,

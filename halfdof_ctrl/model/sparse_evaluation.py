@@ -86,7 +86,16 @@ def require_room(p: int, m: int, points: int) -> None:
 class SparseTransfer:
     """``F(s) P(s)^-1 B(s) + D(s)`` of a sparse model, point by point."""
 
-    def __init__(self, P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients) -> None:
+    def __init__(
+        self,
+        P: Coefficients,
+        B: Coefficients,
+        F: Coefficients,
+        D: Coefficients,
+        *,
+        bounded_above: float = SUSPECT_GROWTH,
+    ) -> None:
+        self.bounded_above = bounded_above  #: growth from which on (DATA) is found
         self.turned = F[0].shape[0] < B[0].shape[1]  #: whether the transpose is solved, for the outputs
         parts = (P, F, B, D) if self.turned else (P, B, F, D)
         square, self.B, self.F, self.D = (
@@ -126,15 +135,17 @@ class SparseTransfer:
         left = None
         if growth > SUSPECT_GROWTH:
             self.exact = ExactPolynomial(self.square) if self.exact is None else self.exact
+        if growth > self.bounded_above:
             left = factors.solve_transposed(F[:MOST_BOUNDED].toarray().T)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
         for start in range(0, B.shape[1], COLUMNS_AT_A_TIME):
             right = B[:, start : start + COLUMNS_AT_A_TIME].toarray()
             solution, backward_error = factors.solve(right)
-            if left is not None and self.exact is not None:
+            if growth > SUSPECT_GROWTH and self.exact is not None:
                 right = np.asarray(right, dtype=np.complex128)
                 solution = refined(self.exact, s, solution, right, lambda residual: factors.solve(residual)[0])
+            if left is not None:
                 self._bound(s, left, solution, start)
             product[:, start : start + COLUMNS_AT_A_TIME] = times(F, solution)
             worst = max(worst, backward_error)

@@ -10,6 +10,7 @@ part, tied to both points.
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, cast, overload
 
 import numpy as np
@@ -224,7 +225,7 @@ def _joined(
     matrices: dict[str, Any] = dict(zip(LETTERS, squares, strict=True)) | signals
     if dense:
         matrices = {key: value.toarray() if hasattr(value, "toarray") else value for key, value in matrices.items()}
-    return mechss(**matrices, name=name)
+    return replace(mechss(**matrices, name=name), known_to=max([model.known_to for model in models]))
 
 
 def _of_elements(elements: Sequence[Spring | Damper], points: Points, ties: Ties) -> SparseMatrix:

@@ -313,7 +313,7 @@ def _realized(
         name=model.name,
     )  # fmt: skip
     found = {field.name: getattr(made, field.name) for field in fields(SecondOrderModel)}
-    return found | {"prescribed": model.prescribed}
+    return found | {"prescribed": model.prescribed, "known_to": model.known_to}
 
 
 def _names(dofs: tuple[str, ...], count: int, rank: int) -> list[str]:

@@ -13,6 +13,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.deflation.method import by_deflation
 from halfdof_ctrl.reduction.dense.method import by_bases, by_selection
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.method.file_digits import warn_of_file_digits
 from halfdof_ctrl.reduction.method.protocol import METHODS, MethodName, ReductionMethod
 from halfdof_ctrl.reduction.sparse.method import by_sparse_bases, by_sparse_selection
 
@@ -65,6 +66,9 @@ def exact_reduction(
     LostDigitsWarning
         A and B lose more than 1e-9 of the largest entry of the transfer function, because W, or J after
         deflation, is ill conditioned.
+    DataLimitWarning
+        Eigenvalues of K are no more than the digits of the model's file leave unknown (rigid-body motions); of M they
+        are a CloseDecisionWarning.
 
     Notes
     -----
@@ -85,6 +89,7 @@ def exact_reduction(
     if solution is None:
         solution = _solved(model.as_dense() if model.is_sparse else model, tol, method)
     solution.evidence.warn(tol)
+    warn_of_file_digits(model, solution.evidence.rcond, tol)
     return ExactReduction(model=solution.model, solution=solution, tol=tol)
 
 

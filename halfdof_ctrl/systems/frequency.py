@@ -19,7 +19,7 @@ from halfdof_ctrl.base.errors import (
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.descriptor.data_limit import dense_frequency_response
+from halfdof_ctrl.descriptor.data_limit import dense_frequency_response, warn_of_digits
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.model.doors import checked_model
@@ -130,6 +130,11 @@ def frequency_response(
     ParameterError
         Frequencies that are no finite, nonnegative numbers.
 
+    Warns
+    -----
+    DataLimitWarning
+        The digits of the file that the model came from do not determine the response.
+
     Notes
     -----
     The states are balanced by powers of two and all points are worked side by side on a Hessenberg
@@ -162,6 +167,8 @@ def frequency_response(
         points = np.exp(points * float(sys.dt))
     dofs = StateSpaceData.of(sys)
     values = state_space_response(*dofs, points) if reduction is None else response_of_model(reduction, dofs, points)
+    if model is not None:
+        warn_of_digits(model, frequencies, values)
     data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
     return with_source(data, source_of(sys if model is None else model) or source_of(sys))
 

@@ -338,7 +338,8 @@ def _at_rest(model: SecondOrderModel) -> SecondOrderModel:
     if not free or len(free) == len(model.dofs):
         return model
     M, C, K = (matrix[free][:, free] for matrix in (model.M, model.C, model.K))
-    return replace(mechss(M, C, K, dofs=[model.dofs[place] for place in free]), prescribed=model.prescribed)
+    held = mechss(M, C, K, dofs=[model.dofs[place] for place in free])
+    return replace(held, prescribed=model.prescribed, known_to=model.known_to)
 
 
 def _units(model: SecondOrderModel, names: Names) -> FloatArray:

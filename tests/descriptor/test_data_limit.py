@@ -1,13 +1,14 @@
 """Warnings of responses that the entries of a model do not determine."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from numpy.testing import assert_allclose
 
-from halfdof_ctrl import descriptor_response, mechss
+from halfdof_ctrl import descriptor_response, frequency_response, mechss
 from halfdof_ctrl.base.errors import DataLimitWarning
 from support.slender_beam import slender_beam, tip_receptance
 from support.structures import Structure, damped_structures
@@ -57,3 +58,23 @@ def test_ordinary_structures_raise_no_warning(structure: Structure) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         descriptor_response(structure.model(), np.geomspace(1e-2, 1e2, 20))
+
+
+@pytest.mark.parametrize("is_sparse", [False, True])
+def test_the_digits_of_a_file_count(*, is_sparse: bool) -> None:
+    """30 elements lose nothing in double precision, and some of ten digits: (DATA) is larger by their ratio."""
+    beam = slender_beam(30, is_sparse=is_sparse)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        descriptor_response(beam, OMEGA)
+    with pytest.warns(DataLimitWarning, match=r"known to the digits of the file \(10 digits, 5e-10\) determine"):
+        descriptor_response(replace(beam, known_to=5e-10), OMEGA)
+
+
+def test_a_response_by_states_is_warned_of_as_well() -> None:
+    """By the same bound; a model of a few stiff springs loses no more than the digits themselves."""
+    with pytest.warns(DataLimitWarning, match="digits of the file"):
+        frequency_response(replace(slender_beam(30, is_sparse=False), known_to=5e-10), OMEGA)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        frequency_response(replace(mechss(np.eye(2), 0.1 * np.eye(2), [[5, -1], [-1, 5]]), known_to=5e-10), OMEGA)

@@ -16,7 +16,6 @@ SURE = 6  #: digits from which few numbers of full length tell a format
 FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
 FEWEST_DIGITS = 4  #: digits of the shortest format that is believed,
 MANY, MOST = 8, 0.5  #: and numbers of full length, and their share, that it takes
-SINGLE_ROUNDING = 2.0**-24  #: rounding of four-byte numbers
 
 
 def digits_of(content: bytes) -> int | None:
@@ -41,17 +40,3 @@ def known_to(content: bytes) -> float:
     """Return the relative rounding of the numbers of a text: half a unit in the last digit of 1, at least `EPS`."""
     digits = digits_of(content)
     return EPS if digits is None else max(EPS, 0.5 * 10.0 ** (1 - digits))
-
-
-def digits_in_words(rounding: float) -> str:
-    """Name a rounding by its digits.
-
-    >>> digits_in_words(5e-10), digits_in_words(SINGLE_ROUNDING)
-    ('10 digits', 'single precision')
-    """
-    if rounding == SINGLE_ROUNDING:
-        return "single precision"
-    count = 1
-    while 0.5 * 10.0 ** (1 - count) > rounding * (1.0 + SHARE):
-        count += 1
-    return f"{count} digits"

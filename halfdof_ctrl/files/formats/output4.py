@@ -24,9 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS
+from halfdof_ctrl.base.digits import SINGLE_ROUNDING
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.columns import runs
-from halfdof_ctrl.files.formats.digits import SINGLE_ROUNDING, known_to
+from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.output4_binary import (
     CUT,
     DAMAGED,

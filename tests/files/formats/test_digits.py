@@ -8,8 +8,9 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl import mechss
 from halfdof_ctrl.base.arrays import EPS
-from halfdof_ctrl.files.definiteness import inertia
-from halfdof_ctrl.files.formats.digits import digits_in_words, digits_of, known_to
+from halfdof_ctrl.base.definiteness import inertia
+from halfdof_ctrl.base.digits import digits_in_words
+from halfdof_ctrl.files.formats.digits import digits_of, known_to
 
 
 @pytest.mark.parametrize("digits", range(6, 16))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.sparse import block_diag, csc_array, diags_array, eye_array, kron
 
-from halfdof_ctrl.files.definiteness import DENSE_SIZE, Inertia, inertia
+from halfdof_ctrl.base.definiteness import DENSE_SIZE, Inertia, inertia
 
 
 def counts(found: Inertia) -> tuple[int, int, int, int]:
@@ -62,7 +62,7 @@ def test_a_grid_with_its_rigid_motion_is_semidefinite() -> None:
 
 def test_many_small_blocks_are_counted_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """A lumped mass has a block for each node, of any size, in any order; batches do not matter."""
-    monkeypatch.setattr("halfdof_ctrl.files.definiteness.BATCH", 20)
+    monkeypatch.setattr("halfdof_ctrl.base.definiteness.BATCH", 20)
     rng = np.random.default_rng(5)
     blocks: list[npt.NDArray[np.float64]] = [np.ones((k, k)) for k in rng.integers(1, 5, 60)]
     blocks += [np.zeros((3, 3)), -np.ones((2, 2))]
