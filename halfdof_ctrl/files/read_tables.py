@@ -11,6 +11,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.files.containers import PathLike, ending
+from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.stiffness_tables import is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
 
@@ -50,8 +51,7 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     (True, ['y'])
     """
     ending(path, TABLE_ENDINGS)
-    with Path(path).open(encoding="utf-8-sig", newline="") as stream:
-        text = stream.read()
+    text = _text(Path(path))
     rows = list(csv.reader(text.splitlines(), delimiter=_separator(text)))
     header = rows[0] if rows else []
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
@@ -66,6 +66,26 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
         "stiffness with their units, such as f [Hz], K' [N/m], K'' [N/m]."
     )
     raise FileFormatError(msg, path=str(path), line=1)
+
+
+def _text(path: Path) -> str:
+    """Read the text of a table, and refuse what is none or was cut short."""
+    if path.exists() and not path.is_file():
+        msg = f"{path}: this is no file. Give a table that ends in .csv."
+        raise FileFormatError(msg, path=str(path))
+    content = path.read_bytes()
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError as cause:
+        line = content.count(b"\n", 0, cause.start) + 1
+        msg = f"{path}, line {line}: bytes that are no text in UTF-8. The file is damaged, or of another kind."
+        raise FileFormatError(msg, path=str(path), line=line) from cause
+    own = text.startswith((FREQUENCY_HEAD[0], TIME_HEAD))
+    if (own and not text.endswith("\n")) or is_cut_short(content):
+        line = text.count("\n") + 1
+        msg = f"{path}, line {line}: it does not end with a line end. The file is cut short: write or copy it anew."
+        raise FileFormatError(msg, path=str(path), line=line)
+    return text
 
 
 def _separator(text: str) -> str:

@@ -10,7 +10,7 @@ data padded to 8 bytes; up to four bytes of data may stand in the tag itself.
 """
 
 import zlib
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -21,8 +21,17 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.mostly_zeros import PIECE, without_zeros
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, require_room
+from halfdof_ctrl.files.formats.variables import (
+    MOST_PARTS,
+    Kind,
+    Value,
+    Variable,
+    another_kind,
+    most_unpacked,
+    require_room,
+)
 
 MAT5_HEADER = 128  #: bytes; the last two tell the byte order
 TAG = 8
@@ -84,6 +93,16 @@ def _described(kind: int, data: bytes, order: str) -> Variable:
     """Describe one variable by its beginning; the rest is unpacked when it is read."""
     packed = kind == COMPRESSED
     head = _Head.of(_variable(*(_peeked(data, order) if packed else (kind, data)), order))
+
+    if (
+        packed
+        and head.kind in NUMERIC
+        and not head.is_complex
+        and _unpacked_length(data, order) > most_unpacked(len(data))
+    ):
+        return Variable(
+            name=head.name, kind="matrix", shape=head.shape, read=partial(_read_sparsely, head, data, order)
+        )
 
     def body() -> tuple[_Head, _Bytes]:
         whole = _variable(*(_inflated(head.name, data, order) if packed else (kind, data)), order)
@@ -227,6 +246,38 @@ def _inflated(name: str, data: bytes, order: str) -> tuple[int, bytes]:
         msg = "a packed variable is not as long as it says"
         raise ValueError(msg)
     return kind, body
+
+
+def _unpacked_length(data: bytes, order: str) -> int:
+    start = zlib.decompressobj().decompress(data, TAG)
+    return int(np.frombuffer(_Bytes(start, order).take(TAG), f"{order}u4")[1])
+
+
+def _read_sparsely(head: _Head, data: bytes, order: str) -> csc_array:
+    """Read a full matrix of zeros mostly, which packs into far fewer bytes, without ever having all of it."""
+    stream = zlib.decompressobj()
+    body = _Bytes(stream.decompress(data, NAME_PEEK), order, TAG)
+    _Head.of(body)
+    kind, length = np.frombuffer(body.take(TAG), f"{order}u4").tolist()
+    if kind not in NUMBER_TYPES:
+        msg = f"an element of type {kind} where numbers should be"
+        raise ValueError(msg)
+    dtype = np.dtype(order + NUMBER_TYPES[kind])
+
+    def pieces() -> Iterator[bytes]:
+        left = length
+        piece = body.data[body.position : body.position + left]
+        while piece:
+            left -= len(piece)
+            yield piece
+            piece = stream.decompress(stream.unconsumed_tail, min(PIECE, left)) if left else b""
+
+    matrix = without_zeros(pieces(), dtype, head.shape, head.name, len(data), by_columns=True)
+    stream.decompress(stream.unconsumed_tail, TAG)  # what fills up the last number, and the checksum
+    if not stream.eof:
+        msg = "a packed variable is not as long as it says"
+        raise ValueError(msg)
+    return matrix
 
 
 def _value(head: _Head, body: _Bytes) -> Value:

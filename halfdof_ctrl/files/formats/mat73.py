@@ -8,6 +8,7 @@ anything is read.
 
 import importlib
 import io
+import math
 from collections.abc import Collection
 from functools import partial
 from typing import Any
@@ -18,8 +19,17 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import DENSE_ROW_LIMIT
 from halfdof_ctrl.base.errors import FileFormatError, MissingExtraError
+from halfdof_ctrl.files.formats.mostly_zeros import PIECE, without_zeros
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import MOST_PARTS, Kind, Value, Variable, another_kind, most_unpacked
+from halfdof_ctrl.files.formats.variables import (
+    MOST_PARTS,
+    Kind,
+    Value,
+    Variable,
+    another_kind,
+    most_unpacked,
+    out_of_room,
+)
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 USER_BLOCK = 512  #: bytes that MATLAB puts before it
@@ -162,6 +172,8 @@ def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN4
         return _sparse(item, name, length)
     if not hasattr(item, "dtype"):
         raise another_kind(name)
+    if item.chunks and item.dtype.kind in REAL_KINDS and item.size * item.dtype.itemsize > most_unpacked(length):
+        return _without_zeros(item, name, length)
     data = _checked(item, name, length)
     if item.attrs.get("MATLAB_empty", 0):
         return []
@@ -175,6 +187,16 @@ def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN4
     if _is_char(item):
         return _rows(data)
     return _numbers(data, name).T
+
+
+def _without_zeros(item: Any, name: str, length: int) -> csc_array:  # noqa: ANN401
+    """Read a full matrix of zeros mostly, some columns at a time."""
+    step = max(1, PIECE // max(1, item.dtype.itemsize * item.shape[-1]))
+    at_once = math.prod(item.chunks) * item.dtype.itemsize
+    if len(item.shape) != 2 or item.is_virtual or item.external or at_once > most_unpacked(length):  # noqa: PLR2004
+        raise out_of_room(name, item.size * item.dtype.itemsize, length)
+    pieces = (np.asarray(item[start : start + step]).tobytes() for start in range(0, item.shape[0], step))
+    return without_zeros(pieces, item.dtype, item.shape[::-1], name, length, by_columns=True)
 
 
 def _checked(item: Any, name: str, length: int) -> npt.NDArray[Any]:  # noqa: ANN401

@@ -9,6 +9,7 @@ Source: NumPy Enhancement Proposal 1, a simple file format for NumPy arrays; num
 """
 
 import io
+import itertools
 import math
 import re
 import zipfile
@@ -21,8 +22,9 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csc_array, csr_array
 
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.mostly_zeros import PIECE, without_zeros
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, require_room
+from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, most_unpacked, out_of_room
 
 Array: TypeAlias = npt.NDArray[Any]
 
@@ -167,10 +169,22 @@ def _member(content: bytes, members: zipfile.ZipFile, info: zipfile.ZipInfo, nam
     return Variable(name=name, kind=header.kind, shape=header.shape, read=partial(_read_member, content, info, name))
 
 
-def _read_member(content: bytes, info: zipfile.ZipInfo, name: str) -> Array:
-    require_room(name, info.file_size, len(content))
+def _read_member(content: bytes, info: zipfile.ZipInfo, name: str) -> Array | csc_array:
+    if info.file_size > most_unpacked(len(content)):
+        return _read_sparsely(content, info, name)
     with zipfile.ZipFile(io.BytesIO(content)) as members, members.open(info) as stream:
         return read_npy(stream.read(info.file_size), name)  # the count bounds a size that lies; the checksum is tested
+
+
+def _read_sparsely(content: bytes, info: zipfile.ZipInfo, name: str) -> csc_array:
+    """Read a matrix of zeros mostly, which packs into far fewer bytes, without ever having all of it."""
+    with zipfile.ZipFile(io.BytesIO(content)) as members, members.open(info) as stream:
+        start = stream.read(len(MAGIC) + 6 + LONGEST_HEADER)
+        header = _header(start, name)
+        if header.dtype is None:
+            raise out_of_room(name, info.file_size, len(content))
+        pieces = itertools.chain([start[header.start :]], iter(partial(stream.read, PIECE), b""))
+        return without_zeros(pieces, header.dtype, header.shape, name, len(content), by_columns=header.fortran_order)
 
 
 def _sparse_variable(stem: str, found: dict[str, Variable]) -> Variable:

@@ -15,7 +15,7 @@ Kind: TypeAlias = Literal["matrix", "text", "struct", "cell", "object"]
 
 MOST_PARTS = 1000  #: of a struct or cell array that are listed
 EXPANSION = 10  #: bytes that are unpacked of a packed byte
-FREE_BYTES = 2**26  #: that may be unpacked whatever the file's length: 2800 x 2800 numbers, mostly zeros
+FREE_BYTES = 2**22  #: that may be unpacked whatever the file's length: 700 x 700 numbers
 PLANE = 2  #: dimensions of a matrix
 
 
@@ -71,11 +71,16 @@ def require_room(name: str, size: int, length: int) -> None:
         It has more bytes than `most_unpacked` allows.
     """
     if size > most_unpacked(length):
-        msg = (
-            f"{name} would take {size} bytes, more than are unpacked from {length}. If it is no damage but a matrix of "
-            "zeros mostly, save it sparse."
-        )
-        raise FileFormatError(msg, path="")
+        raise out_of_room(name, size, length)
+
+
+def out_of_room(name: str, size: int, length: int) -> FileFormatError:
+    """Make the refusal of what is out of proportion to its file."""
+    msg = (
+        f"{name} would take {size} bytes, more than are unpacked from {length}. If it is no damage but a matrix of "
+        "zeros mostly, save it sparse."
+    )
+    return FileFormatError(msg, path="")
 
 
 def another_kind(name: str) -> FileFormatError:

@@ -151,7 +151,7 @@ def bent(change: str) -> bytes:
         ("struct", "K is a struct, string or other object"),
         ("text", "K is a struct, string or other object|K has"),
         ("cells", "K is a struct, string or other object"),
-        ("large", "K has 10000000000 entries, more than are read"),
+        ("large", "K would take 80000000000 bytes, more than are unpacked"),
         ("external", "K lies in another file"),
     ],
 )
