@@ -27,7 +27,7 @@ from halfdof_ctrl.files.import_report import (
     matrix_report,
 )
 from halfdof_ctrl.files.naming import naming_the_file
-from halfdof_ctrl.files.signals import aligned_signals, require_clear_letters, without_dofs
+from halfdof_ctrl.files.signals import aligned_signals, require_clear_letters, taken_signals, without_dofs
 from halfdof_ctrl.files.sources import Source, Sources, find_sources
 
 REQUIRED = ("M", "C", "K")
@@ -110,9 +110,7 @@ def read_matrices(
         names,
         files=tuple([path.name for path in found.files]),
         labelled=dofs is not None,
-        signals=tuple(
-            [f"{letter} from {source.words}" for letter, source in found.signals.items() if letter in signals]
-        ),
+        signals=tuple([_origin(letter, source) for letter, source in taken_signals(found, signals).items()]),
         unused=_unused(found, signals),
         similar=_similar(found, raws, [letter for letter, name in (matrices or {}).items() if name is None]),
         known_to=rounding,
@@ -134,6 +132,12 @@ def read_matrices(
     )
 
 
+def _origin(letter: str, source: Source) -> str:
+    """Tell where a signal comes from, with its name if it is called otherwise."""
+    also = f": {source.name}" if source.raw.named and source.name == source.letter != letter else ""
+    return f"{letter} from {source.words}{also}"
+
+
 def _as_stored(raw: RawMatrix, matrix: csc_array) -> Matrix:
     """Return a matrix dense where its file holds it so: as it is there, or as it was completed."""
     if raw.dense is None:
@@ -144,7 +148,8 @@ def _as_stored(raw: RawMatrix, matrix: csc_array) -> Matrix:
 
 def _unused(found: Sources, signals: Mapping[str, Any]) -> tuple[str, ...]:
     """List what is in the files and not in the model, with its size."""
-    sources = [*found.unused, *(source for letter, source in found.signals.items() if letter not in signals)]
+    taken = [id(source) for source in taken_signals(found, signals).values()]
+    sources = [*found.unused, *(source for source in found.signals.values() if id(source) not in taken)]
     shown = [f"{source.words} ({' x '.join(map(str, source.raw.matrix.shape))})" for source in sources]
     return (*shown, *[f"{path.name}: {part.words}" for path, parts in found.left.items() for part in parts])
 
@@ -267,8 +272,8 @@ def _sizes_differ(found: Sources, raws: Mapping[str, RawMatrix]) -> FileFormatEr
     sizes = listed([f"{letter} {raw.matrix.shape[0]} x {raw.matrix.shape[1]}" for letter, raw in raws.items()])
     also = f" Or one of them is something else; {found.holds}." if found.holds else ""
     msg = (
-        f"{path}: the matrices differ in size ({sizes}), and there are no labels for all. Write them from one run."
-        f"{also}"
+        f"{path}: the matrices differ in size ({sizes}), and there are no labels for all. Write them from one run, or "
+        f"leave one out, as matrices={{'C': None}}.{also}"
     )
     return FileFormatError(msg, path=str(path))
 

@@ -85,7 +85,8 @@ def _in_folder(folder: Path) -> list[Path]:
         return whole
     known = f"It holds {listed([path.name for path in files])}. " if files else ""
     if whole:
-        msg = f"{folder}: more than one model lies in this folder: {listed([path.name for path in whole])}. Give one."
+        names = listed([path.name for path in whole])
+        msg = f"{folder}: {len(whole)} models in it: {names}. Give the path of one of them."
     elif len(single := [path for path in files if path.suffix.lower() in ARRAY_ENDINGS]) == 1:
         return single
     else:

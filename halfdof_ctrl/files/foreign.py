@@ -61,4 +61,7 @@ as text (job_STIF1.mtx).'
         found = list(FOREIGN_ENDINGS[".op2"])
     if found is None and path.suffix.lower() in FOREIGN_ENDINGS:
         found = list(FOREIGN_ENDINGS[path.suffix.lower()])
-    return None if found is None else f"this is {found[0]}, which is not read. Instead: {found[1]}."
+    if found is None:
+        return None
+    also = "" if found[0].endswith("read") else ", which is not read"
+    return f"this is {found[0]}{also}. Instead: {found[1]}."

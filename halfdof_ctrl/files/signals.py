@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csc_array, issparse
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, Storage
-from halfdof_ctrl.files.sources import Sources
+from halfdof_ctrl.files.sources import Source, Sources
 
 OUTPUTS, INPUTS = "FGH", "B"
 MEANING = {
@@ -93,6 +93,12 @@ def aligned_signals(found: Sources, names: Sequence[str], *, labelled: bool) -> 
         else:
             signals[key] = raw.matrix if raw.dense is None else raw.dense
     return signals, notes
+
+
+def taken_signals(found: Sources, signals: Mapping[str, Any]) -> dict[str, Source]:
+    """Return where each signal comes from: a load called F is B."""
+    load = {"B": found.signals["F"]} if "B" in signals and "B" not in found.signals else {}
+    return load | {letter: source for letter, source in found.signals.items() if letter in signals}
 
 
 def without_dofs(letter: str, part: Any, kept: npt.NDArray[Any]) -> Any:  # noqa: ANN401  # dense or sparse

@@ -12,7 +12,7 @@ from typing import Any
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS
-from halfdof_ctrl.files.folders import LABEL_ENDINGS, all_files
+from halfdof_ctrl.files.folders import LABEL_ENDINGS, all_files, several_models
 from halfdof_ctrl.files.foreign import OCTAVE, foreign_kind
 from halfdof_ctrl.files.formats import abaqus, calculix, dmig, harwell_boeing, matrix_market, output4, table
 from halfdof_ctrl.files.formats.npy import is_npy, is_npz
@@ -108,7 +108,7 @@ def find_sources(given: Sequence[Path] | Mapping[str, Path], titles: Titles) -> 
             reading.add(path)
     for path in with_labels(list(reading.files)):
         reading.add_labels(path)
-    return reading.result()
+    return reading.result() if told else reading.all_of_one([Path(path) for path in given])
 
 
 def _require_letters(letters: Sequence[str]) -> None:
@@ -214,6 +214,18 @@ class _Reading:
             msg = f"{where}: nothing says which matrix is M, C or K: {remedy}."
             raise FileFormatError(msg, path=str(next(iter(self.files))))
         return found
+
+    def all_of_one(self, given: Sequence[Path]) -> Sources:
+        """Give the result; for a folder whose files do not make one model, refuse with the models that they make."""
+        try:
+            return self.result()
+        except FileFormatError as refusal:
+            several = several_models(given[0]) if len(given) == 1 else ""
+            if not several:
+                raise
+            models = [line.strip() for line in several.splitlines()[1:]]
+            msg = f"{given[0]}: {len(models)} models in it. Give the file before the colon: {'; '.join(models)}."
+            raise FileFormatError(msg, path=str(given[0])) from refusal
 
 
 def _numbered(sources: list[Source]) -> list[Source]:

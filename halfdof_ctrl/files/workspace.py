@@ -153,6 +153,8 @@ def _chosen(found: Sequence[Variable], titles: Mapping[str, str | None]) -> dict
     claimed = [variable.name for variable in chosen.values()]
     for variable in found:
         letter = variable.name
+        if variable.kind == "matrix" and 0 in variable.shape:  # [], by which MATLAB says that there is none
+            continue
         readable = letter in SQUARE[:3] or (letter in SIGNALS and variable.kind == "matrix")
         if readable and letter not in titles and letter not in claimed:
             chosen[letter] = variable
@@ -194,7 +196,8 @@ def _proposal(found: Sequence[Variable]) -> str:
                 variable.name
                 for variable in square
                 if variable.name not in taken
-                and re.fullmatch(pattern, variable.name.split(".")[-1].split("{")[0].lower())
+                and "{" not in variable.name  # of a cell array its name says nothing of each
+                and re.fullmatch(pattern, variable.name.split(".")[-1].lower())
             ]
             if hits:
                 words.append(f"{letter!r}: {hits[0]!r}")
@@ -245,9 +248,12 @@ def _as_matrix(letter: str | None, name: str, value: Any) -> tuple[csc_array, An
         column = np.atleast_2d(array).T if letter[0] == "B" else np.atleast_2d(array)
         return csc_array(np.asarray(column, dtype=np.result_type(array, np.float64))), array
     if letter in SQUARE and array.ndim == PLANE and array.shape[0] != array.shape[1] and array.dtype.kind in "biufc":
+        lumped = (
+            " If these are the entries of a diagonal, save them as a matrix, diag(...)." if 1 in array.shape else ""
+        )
         msg = (
-            f"{shown} must be square, but it is {array.shape[0]} x {array.shape[1]}. If it is something else, name the "
-            f"right one, matrices={{{letter!r}: name}}, or leave it out, matrices={{{letter!r}: None}}."
+            f"{shown} must be square, but it is {array.shape[0]} x {array.shape[1]}.{lumped} If it is something else, "
+            f"name the right one, matrices={{{letter!r}: name}}, or leave it out, matrices={{{letter!r}: None}}."
         )
         raise MatrixError(msg, matrix=shown)
     checked = checked_matrix(array, shown, None if letter in SQUARE[:3] else array.shape if array.ndim > 1 else None)

@@ -94,7 +94,10 @@ REFUSED = [
         {"K__mtx": matrix_market(K), "stiff__mtx": matrix_market(K)},
         r"more than one matrix could be K: K\.mtx, stiff\.mtx",
     ),
-    ({"job_STIF1__mtx": abaqus(K), "job_STIF2__mtx": abaqus(K)}, "more than one matrix could be K"),
+    (
+        {"job_STIF1__mtx": abaqus(K), "job_STIF2__mtx": abaqus(K)},
+        r"2 models in it\. Give the file before the colon: job_STIF1\.mtx: job_STIF1\.mtx; job_STIF2",
+    ),
     ({"a__mtx": matrix_market(K)}, r"nothing says which matrix is M, C or K: it holds a\.mtx"),
     ({"a__mapping": mapping()}, "it holds names of DOFs only"),
     ({"a__op4": output4_binary({"KGG": K, "KAA": M}, "dense")}, r"matrices=\{'K': name\}"),

@@ -237,3 +237,32 @@ def test_a_d_beside_the_damping_is_a_direct_term_only_where_there_are_signals(tm
         load_model(written(tmp_path / "a.npz", {**MODEL, "D": np.eye(3)}))
     model = load_model(written(tmp_path / "b.npz", {**MODEL, "D": np.eye(3), "B": np.eye(3), "F": np.eye(3)}))
     np.testing.assert_array_equal(model.D, np.eye(3))
+
+
+@pytest.mark.parametrize("ending", [".mat", "v4.mat"])
+def test_an_empty_matrix_says_that_there_is_none(tmp_path: Path, ending: str) -> None:
+    """[] is how MATLAB says so, and it is as if it were not in the file."""
+    path = written(tmp_path / f"a{ending}", {"M": M, "C": np.zeros((0, 0)), "D": np.zeros((0, 0)), "K": K})
+    with pytest.warns(ImportedModelWarning, match="no damping C"):
+        model = load_model(path)
+    assert not model.C.any()
+    assert not model.D.any()
+
+
+def test_the_way_out_fits_what_is_there(tmp_path: Path) -> None:
+    """A lumped mass as a column, a number for a matrix, a cell array whose name is no letter."""
+    with pytest.raises(FileFormatError, match=r"M must be square, but it is 3 x 1\. If these are .*diag\("):
+        load_model(written(tmp_path / "a.mat", {"M": M.diagonal()[:, None], "K": K}))
+    with pytest.raises(FileFormatError, match=r"differ in size \(M 3 x 3, C 1 x 1, .*matrices=\{'C': None\}"):
+        load_model(written(tmp_path / "a.mat", {"M": M, "K": K, "C": np.zeros((1, 1))}))
+    cells = np.empty((1, 2), dtype=object)
+    cells[0, 0], cells[0, 1] = M, K
+    with pytest.raises(FileFormatError, match=r"mats\{1\}, mats\{2\} .*matrices=\{'K': name, 'M': name, 'C': name\}"):
+        load_model(written(tmp_path / "a.mat", {"mats": cells}))
+
+
+def test_a_load_is_told_as_what_it_is_taken_for(tmp_path: Path) -> None:
+    """And not as unused at the same time."""
+    found = inspect_files(written(tmp_path / "a.mat", {**MODEL, "F": np.array([[0.0], [0.0], [1.0]])}))
+    assert found.signals == ("B from a.mat: F",)
+    assert found.unused == ()

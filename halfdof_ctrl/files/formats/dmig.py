@@ -32,6 +32,7 @@ SMALL, LARGE = 8, 16  #: characters of a field
 SYMMETRIC, SQUARE_FORMS, COMPLEX_TYPES = 6, (1, 6), (3, 4)
 FORMS, TYPES = (1, 2, 6, 9), (0, 1, 2, 3, 4)
 POLAR_FIELD = 5
+NO_KIND = "which are none that DMIG has"
 LARGEST_NODE = 2**60
 EXPONENT = re.compile(r"(?<=[0-9.])([+-])")  #: 1.5-3 and 1.5D-3 are 1.5e-3
 DMIG = re.compile(rb"^DMIG[ *,\t]", re.MULTILINE | re.IGNORECASE)
@@ -147,7 +148,8 @@ def _line_by_line(content: bytes) -> list[_Entries]:
             msg = f"a column of {name!r} before its header. The file is damaged."
             raise FileFormatError(msg, path="", line=line) from cause
         except (ValueError, IndexError) as cause:
-            msg = f"a DMIG entry of {name!r} with fields that are no numbers. The file is damaged."
+            what = str(cause) if str(cause).endswith(NO_KIND) else "fields that are no numbers. The file is damaged"
+            msg = f"a DMIG entry of {name!r} with {what}."
             raise FileFormatError(msg, path="", line=line) from cause
     return [entries.gathered() for entries in (*earlier, *found.values())]
 
@@ -192,7 +194,7 @@ def _opened(name: str, fields: list[str]) -> _Entries:
     form, kind = int(fields[2]), int(fields[3])
     polar = int(fields[5].strip() or 0) if len(fields) > POLAR_FIELD else 0
     if form not in FORMS or kind not in TYPES:
-        msg = f"form {form} and type {kind} are none of DMIG"
+        msg = f"form {form} and type {kind}, {NO_KIND}"
         raise ValueError(msg)
     return _Entries(name, form, kind in COMPLEX_TYPES, polar > 0)
 
