@@ -3,7 +3,8 @@
     job.sti, job.mas     row, column, value: the upper triangle of stiffness and mass, 14 digits, zeros among them
     job.dof              a line for each row: node.DOF, as 5.1
 
-Constrained DOFs are not in the files. Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine
+Constrained DOFs are not in the files. Zeros are written too, so that each row has its lines in both, and a file with
+fewer rows than the ``.dof`` file names was cut short. Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine
 ``matrixstorage``.
 """
 
@@ -59,7 +60,6 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
         declared="symmetric" if one_sided else "unsymmetric",
         format="CalculiX",
         letter=KIND_BY_ENDING[ending],
-        open_size=True,
         known_to=known_to(content),
     )
 

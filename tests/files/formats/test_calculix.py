@@ -12,14 +12,14 @@ from halfdof_ctrl.files.formats.calculix import read_calculix, read_dofs
 
 K = np.array([[4.0, -1.0, 0.0], [-1.0, 3.0, -0.5], [0.0, -0.5, 2.0]])
 STI = b"1 1  4.0e+00\n1 2 -1.0e+00\n2 2  3.0e+00\n1 3  0.0e+00\n2 3 -5.0e-01\n3 3  2.0e+00\n"
-MAS = b"1 1  1.0e+00\n2 2  1.0e+00\n"  # the last DOF has no mass, and no line
+MAS = b"1 1  1.0e+00\n2 2  1.0e+00\n3 3  0.0e+00\n"  # the last DOF has no mass, and its line
 DOF = b"5.1\n5.3\n60.2\n"
 BEAM = Path(__file__).parents[2] / "data" / "calculix" / "beam.sti"  # of beam.inp, as CalculiX 2.20 writes it
 
 
 @pytest.mark.parametrize("given", ["job.sti", "job.mas", "job.dof", "."])
 def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
-    """From any of them, or the folder; rows without an entry at the end are there."""
+    """From any of them, or the folder."""
     for name, content in (("job.sti", STI), ("job.mas", MAS), ("job.dof", DOF), ("other.sti.bak", b"")):
         (tmp_path / name).write_bytes(content)
     with pytest.warns(ImportedModelWarning, match="no damping C"):
@@ -27,6 +27,17 @@ def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
     assert model.dofs == ("n5_u1", "n5_u3", "n60_u2")
     np.testing.assert_array_equal(model.K.toarray(), K)
     np.testing.assert_array_equal(model.M.toarray(), np.diag([1.0, 1.0, 0.0]))
+
+
+@pytest.mark.parametrize(("name", "lines"), [("job.mas", 2), ("job.sti", 3)])
+def test_a_file_that_ends_before_the_last_row_was_cut(tmp_path: Path, name: str, lines: int) -> None:
+    """CalculiX writes the zeros of each row too, so that every row that the .dof file names has its lines."""
+    files = {"job.sti": STI, "job.mas": MAS, "job.dof": DOF}
+    files[name] = b"".join(files[name].splitlines(keepends=True)[:lines])
+    for each, content in files.items():
+        (tmp_path / each).write_bytes(content)
+    with pytest.raises(FileFormatError, match=r"2 rows, but job\.dof names 3"):
+        load_model(tmp_path)
 
 
 def test_a_beam_has_the_frequencies_that_calculix_found() -> None:
