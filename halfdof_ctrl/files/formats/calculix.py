@@ -4,8 +4,9 @@
     job.dof              a line for each row: node.DOF, as 5.1
 
 Constrained DOFs are not in the files. Zeros are written too, so that each row has its lines in both, and a file with
-fewer rows than the ``.dof`` file names was cut short. Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine
-``matrixstorage``.
+fewer rows than the ``.dof`` file names was cut short.
+
+Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine ``matrixstorage``.
 """
 
 import re
