@@ -215,7 +215,9 @@ def _cached_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
 
 def _checked_dofs(names: tuple[str, ...], count: int) -> tuple[str, ...]:
     dofs = checked_names(names, count, "DOFs")
-    derived = [name for name in dofs if name.endswith(DERIVATIVE_SUFFIXES[1:])]
+    every = "\n".join([*dofs, ""])
+    may_be_derived = any(f"{suffix}\n" in every for suffix in DERIVATIVE_SUFFIXES[1:])
+    derived = [name for name in dofs if name.endswith(DERIVATIVE_SUFFIXES[1:])] if may_be_derived else []
     places = dict.fromkeys(dofs) if derived else {}
     clash = tuple([name for name in derived if any(stem in places for stem, _ in derivative_stems(name))])
     if clash:

@@ -11,7 +11,10 @@ Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine ``matri
 
 import re
 
+import numpy as np
+
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.columns import cut_lines, whole_fields
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, assembled
@@ -20,7 +23,8 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
 LABEL = re.compile(rb"(\d{1,10})\.(\d{1,2})")
-MOST_DIGITS = 10  #: of a node
+SHORTEST, LONGEST = b"1.1", 12  #: a name, and characters of one: ten digits, a point and a digit
+POINT, TEN = ord("."), 10
 COLUMNS = 3
 
 
@@ -78,12 +82,12 @@ def read_dofs(content: bytes) -> tuple[str, ...]:
     >>> read_dofs(b"5.1\n5.3\n60.2\n")
     ('n5_u1', 'n5_u3', 'n60_u2')
     """
-    lines = content.split()
-    return _plain_dofs(lines) or _dofs_by_line(lines)
+    return _plain_dofs(content) or _dofs_by_line(content)
 
 
-def _dofs_by_line(lines: list[bytes]) -> tuple[str, ...]:
+def _dofs_by_line(content: bytes) -> tuple[str, ...]:
     """Read the names one by one, with the line that is wrong."""
+    lines = content.split()
     found = [LABEL.fullmatch(line) for line in lines]
     wrong = next((number for number, match in enumerate(found, start=1) if match is None), 0)
     if wrong or not lines:
@@ -93,14 +97,17 @@ def _dofs_by_line(lines: list[bytes]) -> tuple[str, ...]:
     return dof_names([int(match[1]) for match in found if match], [int(match[2]) for match in found if match])
 
 
-def _plain_dofs(lines: list[bytes]) -> tuple[str, ...] | None:
+def _plain_dofs(content: bytes) -> tuple[str, ...] | None:
     """Read names that all are a node, a point and one digit, None if they are not."""
-    nodes, endings = b" ".join([line[:-2] for line in lines]), b"".join([line[-2:] for line in lines])
-    components = endings[1::2]
-    plain = len(endings) == 2 * len(lines) > 0 and endings[::2] == b"." * len(lines) and components.isdigit()
-    fields = nodes.split()
-    if not plain or len(fields) != len(lines) or not b"".join(fields).isdigit():
+    lines = cut_lines(content)
+    if not lines.starts.size or not ((lines.lengths > len(SHORTEST) - 1) & (lines.lengths <= LONGEST)).all():
         return None
-    if max(map(len, fields)) > MOST_DIGITS:
+    fields = lines.cut_from_the_right(LONGEST)
+    components = fields[:, -1] - np.uint8(ord("0"))
+    if not ((fields[:, -2] == POINT) & (components < TEN)).all() or (fields == ord("-")).any():
         return None
-    return dof_names([int(field) for field in fields], [component - ord("0") for component in components])
+    try:
+        nodes = whole_fields(fields[:, :-2])
+    except ValueError:
+        return None
+    return dof_names(nodes.tolist(), components.tolist())

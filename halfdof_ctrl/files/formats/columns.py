@@ -56,6 +56,15 @@ class CutLines:
             cut[short] = np.where(beyond, np.uint8(BLANK), cut[short])
         return cut
 
+    def cut_from_the_right(self, width: int) -> Characters:
+        """Cut out the last characters of each line, filled with blanks at their left where a line is shorter."""
+        text = np.concatenate([np.full(width, BLANK, dtype=np.uint8), self.text])
+        cut = np.lib.stride_tricks.sliding_window_view(text, width)[self.starts + self.lengths]
+        short = np.flatnonzero(self.lengths < width)
+        before = np.arange(width) < width - self.lengths[short, None]
+        cut[short] = np.where(before, np.uint8(BLANK), cut[short])
+        return np.asarray(cut)
+
 
 def cut_lines(content: bytes) -> CutLines:
     r"""Find the lines of a text, which end with a line feed, with a carriage return before it or not.

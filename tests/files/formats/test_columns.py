@@ -69,8 +69,17 @@ def test_what_is_no_finite_number_is_refused(field: str) -> None:
 @given(nodes=NODES, data=st.data())
 def test_names_of_calculix_are_the_same_either_way(nodes: list[int], data: st.DataObject) -> None:
     """Node, point, DOF."""
-    lines = [f"{node}.{data.draw(st.integers(1, 6))}".encode() for node in nodes]
-    assert _plain_dofs(lines) == _dofs_by_line(lines)
+    end = data.draw(st.sampled_from(["\n", "\r\n"]))
+    content = "".join([f"{node}.{data.draw(st.integers(1, 6))}{end}" for node in nodes]).encode()
+    assert _plain_dofs(content) == _dofs_by_line(content)
+
+
+@pytest.mark.parametrize(
+    "content", [b"", b"5.1\n\n", b"5.1 \n", b"5.11\n", b"5-1\n", b"x.1\n", b".1\n", b"-5.1\n", b"12345678901.1\n"]
+)
+def test_unusual_names_of_calculix_are_left_to_the_reader_of_lines(content: bytes) -> None:
+    """Which names the line that is wrong."""
+    assert _plain_dofs(content) is None
 
 
 @given(nodes=NODES, data=st.data())
