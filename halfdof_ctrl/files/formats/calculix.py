@@ -42,7 +42,7 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
     Raises
     ------
     FileFormatError
-        Lines that are no row, column and value; numbers from zero; no line at all.
+        Lines that are no row, column and value; numbers from zero; no line at all, or none for a row.
 
     Examples
     --------
@@ -55,6 +55,14 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
     size = int(places.max(initial=-1)) + 1
     if not 0 < size <= most_rows or places.min() < 0:
         msg = f"rows of row, column and value, counted from 1 to {size}, do not make a matrix. The file is damaged."
+        raise FileFormatError(msg, path="")
+    on_diagonal = np.zeros(size, dtype=bool)
+    on_diagonal[places[places[:, 0] == places[:, 1], 0]] = True
+    if not on_diagonal.all():
+        msg = (
+            f"row {int(np.argmin(on_diagonal)) + 1} has no line on its diagonal, where CalculiX writes zeros too. The "
+            "file is damaged: copy or write it anew."
+        )
         raise FileFormatError(msg, path="")
     one_sided = bool((places[:, 0] <= places[:, 1]).all() or (places[:, 0] >= places[:, 1]).all())
     return assembled(

@@ -40,6 +40,12 @@ def test_a_file_that_ends_before_the_last_row_was_cut(tmp_path: Path, name: str,
         load_model(tmp_path)
 
 
+def test_a_row_without_a_line_was_lost() -> None:
+    """Somewhere in the middle, as where a part of a file is missing."""
+    with pytest.raises(FileFormatError, match="row 2 has no line on its diagonal"):
+        read_calculix(STI.replace(b"2 2  3.0e+00\n", b""), ".sti", 99)
+
+
 def test_a_beam_has_the_frequencies_that_calculix_found() -> None:
     """105.425, 665.943, 1891.57 Hz, each twice; six digits are known."""
     with pytest.warns(ImportedModelWarning, match="no damping C"):
