@@ -33,7 +33,7 @@ from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
-from halfdof_ctrl.systems.phase import source_of, with_source
+from halfdof_ctrl.systems.phase_sources import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, system_of_model
@@ -170,7 +170,7 @@ def frequency_response(
     if model is not None:
         warn_of_digits(model, frequencies, values)
     data = _data(values, frequencies, sys.input_labels, sys.output_labels, sys.name, dt=sys.dt)
-    return with_source(data, source_of(sys if model is None else model) or source_of(sys))
+    return with_source(data, source_of(sys) if model is None else source_of(model, sys))
 
 
 def has_many_states(model: SecondOrderModel) -> bool:

@@ -1,109 +1,44 @@
 """The phase of a response on one branch, from poles and zeros and not from its samples.
 
-    phi(w) = sum_zeros th(w - z) - sum_poles th(w - p)   [- 180 deg if the gain at low frequency is negative],
+    phi(w) = sum_zeros th(w - z) - sum_poles th(w - p) + what it is at w = 0,
     th(w - r) = atan2(w - b, |a|)  for a root r = a + jb on or left of the axis, its negative right of it
 
-A root on the axis counts as the limit of vanishing damping: a pole lowers the phase by 180 deg, a zero raises it.
+and likewise along the unit circle for discrete systems (`phase_sources`). A root on the axis counts as the limit of
+vanishing damping: a pole lowers the phase by 180 deg, a zero raises it. At w = 0 the phase is 90 deg for each zero at the
+origin, less 90 deg for each pole there, and 180 deg beside that where the gain is negative, on the side nearer to 0.
 What is shown is the angle of the value itself, on the turn nearest to phi, so that any grid gives the same branch.
-Where phi and the values disagree the zeros are wrong; then the phase is followed along half circles in the right half
-plane, over each interval of the grid, where a response without roots there is smooth.
+Where phi and the values disagree the zeros are wrong, and where there are too many of them none are computed; then the
+phase is followed along half circles in the right half plane, over each interval of the grid, where a response without
+roots there is smooth. At a DOF that is driven and observed it is known without either: work is done on the structure, so
+that a receptance stays between 0 and -180 deg.
 """
-
-from dataclasses import dataclass
 
 import control
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
-from halfdof_ctrl.systems.hessenberg import state_space_response
-from halfdof_ctrl.systems.pencil_poles import pencil_poles
-from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
+from halfdof_ctrl.systems.phase_sources import SOURCE, KnownSource, LargeSource, Source
+from halfdof_ctrl.systems.pole_bounds import BoundedPoles
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
-from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
-SOURCE = "halfdof_source"  #: attribute of a FrequencyResponseData: where its values come from
 ON_AXIS = 4.0  #: times its bound: a pole nearer to the axis is on it
 ZERO_ON_AXIS = 1e-9  #: of its size: a zero nearer to the axis is on it
 CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a motion that is not reached
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
 BESIDE = 1e-9  #: relative distance to a root on the axis within which the angle says nothing
-EFFORT = 2e8  #: channels times cubed size up to which zeros are computed
-LARGEST_DENSE = 300  #: DOFs of a model up to which they are
+POLE_EFFORT = 1.1e9  #: cubed size up to which poles are computed
+ZERO_EFFORT = 3e8  #: channels times cubed size up to which zeros are computed
+CIRCLE_EFFORT = 2e10  #: channels times frequencies times squared size up to which half circles are followed
 RATIO = 1.2  #: of the ends of an interval that a half circle spans
 STEP = np.pi / 3.0  #: [rad] largest change between points of a half circle
 ARC_POINTS = 5
 HALVINGS = 6
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class SystemSource:
-    """Values come from a continuous state space."""
-
-    data: StateSpaceData
-
-    @property
-    def size(self) -> int:
-        """Order."""
-        return len(self.data.A)
-
-    def poles(self) -> BoundedPoles:
-        """Return the poles."""
-        return bounded_poles(self.data.A)
-
-    def zeros(self, output: int, source: int) -> ComplexArray:
-        """Return the zeros of a channel."""
-        return system_zeros(self.data.channel(output, source))
-
-    def response(self, output: int, source: int, points: ComplexArray) -> ComplexArray:
-        """Evaluate a channel."""
-        return np.asarray(state_space_response(*self.data.channel(output, source), points)[0, 0])
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ModelSource:
-    """Values come from a real, dense model."""
-
-    model: SecondOrderModel
-
-    @property
-    def size(self) -> int:
-        """Order of the pencil."""
-        return 2 * len(self.model.dofs)
-
-    def poles(self) -> BoundedPoles:
-        """Return the finite eigenvalues."""
-        return pencil_poles(self.model)
-
-    def zeros(self, output: int, source: int) -> ComplexArray:
-        """Return the zeros of a channel."""
-        return descriptor_zeros(self.model, output, source)
-
-    def response(self, output: int, source: int, points: ComplexArray) -> ComplexArray:
-        """Evaluate a channel."""
-        channel = self.model.select(self.model.inputs[source], self.model.outputs[output])
-        return np.asarray(channel(points, squeeze=False)[0, 0])
-
-
-Source = SystemSource | ModelSource
-
-
-def with_source(data: control.FrequencyResponseData, source: Source | None) -> control.FrequencyResponseData:
-    """Note in a response where its values come from."""
-    if source is not None:
-        setattr(data, SOURCE, source)
-    return data
-
-
-def source_of(sysdata: control.StateSpace | SecondOrderModel) -> Source | None:
-    """Return what the phase of a system or model follows from, None where its samples are all there is."""
-    if isinstance(sysdata, SecondOrderModel):
-        usable = not sysdata.is_sparse and not sysdata.is_complex and len(sysdata.dofs) <= LARGEST_DENSE
-        return ModelSource(sysdata) if usable else None
-    if sysdata.isdtime(strict=True):
-        return None
-    return SystemSource(StateSpaceData.of(sysdata))
+BELOW = 1e-2  #: of the slowest pole: where the phase is what it is at the origin
+TIED = 1.0  #: [rad] two starts that are so nearly as far from 0: the negative one is taken
+SIDE = 1e-6  #: [rad] by which rounding puts a phase outside what work on the structure allows
 
 
 def response_phase(data: control.FrequencyResponseData) -> FloatArray:
@@ -112,8 +47,9 @@ def response_phase(data: control.FrequencyResponseData) -> FloatArray:
     Parameters
     ----------
     data : control.FrequencyResponseData
-        Of functions of this package the branch follows from poles and zeros of the model; of others, of discrete and of
-        sparse models from the samples (`continuous_phase`).
+        Of functions of this package the branch follows from poles and zeros, continuous or discrete, of the model; of
+        others, and of sparse models with more than 1000 states, from the samples (`continuous_phase`), but where a DOF
+        is both driven and observed.
 
     Returns
     -------
@@ -129,16 +65,19 @@ def response_phase(data: control.FrequencyResponseData) -> FloatArray:
     [[[0.0, -180.0, -180.0]]]
     """
     values, omega = np.asarray(data.frdata), np.asarray(data.omega, dtype=float)
-    source: Source | None = getattr(data, SOURCE, None)
+    given: Source | None = getattr(data, SOURCE, None)
+    source = given.reduced() if isinstance(given, LargeSource) else given
+    channels = values.shape[0] * values.shape[1]
+    poles = source.poles() if source is not None and source.size**3 <= POLE_EFFORT else None
     phase = np.empty(values.shape)
-    few = source is not None and values.shape[0] * values.shape[1] * source.size**3 <= EFFORT
-    poles = source.poles() if source is not None and few else None
     for i, j in np.ndindex(*values.shape[:2]):
         found = None
-        if source is not None and poles is not None:
+        if source is not None and poles is not None and channels * source.size**3 <= ZERO_EFFORT:
             found = _by_roots(source, poles, (i, j), omega, values[i, j])
-            if found is None:
-                found = _along_half_circles(source, poles, (i, j), omega, values[i, j])
+        if found is None and given is not None and given.model is not None:
+            found = _by_work(given.model, (i, j), values[i, j])
+        if found is None and source is not None and channels * omega.size * source.size**2 <= CIRCLE_EFFORT:
+            found = _along_half_circles(source, poles, (i, j), omega, values[i, j])
         phase[i, j] = continuous_phase(values[i, j]) if found is None else found
     return phase
 
@@ -153,112 +92,189 @@ def _on_turn(angle: FloatArray, phi: FloatArray) -> FloatArray:
     return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
 
 
+def _wrapped(angle: npt.ArrayLike) -> FloatArray:
+    """Put angles between -pi and pi."""
+    return np.asarray(np.mod(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi)
+
+
 def _by_roots(
-    source: Source, poles: BoundedPoles, channel: tuple[int, int], omega: FloatArray, values: ComplexArray
+    source: KnownSource, poles: BoundedPoles, channel: tuple[int, int], omega: FloatArray, values: ComplexArray
 ) -> FloatArray | None:
     """Return the phase from poles and zeros, None where it does not agree with the values."""
-    zeros = source.zeros(*channel)
+    plane, zeros = source.plane, source.zeros(*channel)
     left, zeros = _without_common(poles, zeros)
-    p = poles.values[left].copy()
-    on_axis = np.abs(p.real) <= ON_AXIS * poles.bounds[left]
-    p[on_axis] = 1j * p[on_axis].imag
-    z = np.where(np.abs(zeros.real) <= ZERO_ON_AXIS * np.abs(zeros), 1j * zeros.imag, zeros)
-    gain = _sign_of_gain(source, channel, p, z)
-    if gain == 0.0:
+    p = plane.on_boundary(poles.values[left], ON_AXIS * poles.bounds[left])
+    z = plane.on_boundary(zeros, ZERO_ON_AXIS * np.abs(zeros))
+    gain = _angle_of_gain(source, channel, p, z)
+    if gain is None:
         return None
-    phi = _swept(omega, z) - _swept(omega, p)
-    if gain * (-1.0) ** np.count_nonzero(np.concatenate([p, z]).real > 0.0) < 0.0:
-        at_start = -(np.count_nonzero(p == 0.0) - np.count_nonzero(z == 0.0)) * np.pi / 2.0
-        phi += np.pi if abs(at_start + np.pi) < abs(at_start - np.pi) else -np.pi
+    slow_z, slow_p = plane.at_start(z), plane.at_start(p)
+    base = 0.5 * np.pi * float(np.count_nonzero(slow_z) - np.count_nonzero(slow_p))
+    none = np.zeros(1)
+    begin = float((plane.swept(none, z[~slow_z]) - plane.swept(none, p[~slow_p]))[0])
+    rest = _start(base, gain + plane.constant(z) - plane.constant(p) + begin, is_real=source.is_real)
+    phi = plane.swept(omega, z) - plane.swept(omega, p) - begin + rest
     angle = _angle(values)
     away = np.ones(omega.size, dtype=bool)
-    for root in np.concatenate([p, z]):
-        if root.real == 0.0:
-            away &= np.abs(omega - root.imag) > BESIDE * omega
-    difference = np.abs(np.mod(angle - phi + np.pi, 2.0 * np.pi) - np.pi)[away]
+    for root in np.concatenate([plane.touching(p), plane.touching(z)]):
+        away &= np.abs(omega - root.imag) > BESIDE * omega
+    difference = np.abs(_wrapped(angle - phi))[away]
     if not np.nan_to_num(difference).max(initial=0.0) < AGREES:
         return None
     return _on_turn(angle, phi)
+
+
+def _start(base: float, rest: float, *, is_real: bool) -> float:
+    """Return what the phase has at the origin beside 90 deg for each root there: nearest to 0, ties below."""
+    rest = float(_wrapped(rest))
+    if is_real:
+        rest = 0.0 if abs(rest) < np.pi / 2.0 else -np.pi
+    if abs(rest) < np.pi / 2.0:
+        return rest
+    low = rest - 2.0 * np.pi if rest > 0.0 else rest
+    return low + 2.0 * np.pi if abs(base + low + 2.0 * np.pi) < abs(base + low) - TIED else low
 
 
 def _without_common(poles: BoundedPoles, zeros: ComplexArray) -> tuple[list[int], ComplexArray]:
     """Take out zeros with the poles that they cancel; return the places of the poles left."""
     left, kept = list(range(poles.values.size)), []
     for zero in zeros.tolist():
-        near = [
-            place
-            for place in left
-            if abs(poles.values[place] - zero)
-            <= max(CANCELLED * abs(zero), ON_AXIS * float(poles.bounds[place]) * (zero != 0.0))
-        ]
-        if near:
-            left.remove(min(near, key=lambda place: abs(poles.values[place] - zero)))
+        places = np.array(left, dtype=np.intp)
+        apart = np.abs(poles.values[places] - zero)
+        allowed = np.maximum(CANCELLED * abs(zero), ON_AXIS * poles.bounds[places] * (zero != 0.0))
+        near = np.flatnonzero(apart <= allowed)
+        if near.size:
+            left.pop(int(near[apart[near].argmin()]))
         else:
             kept.append(zero)
     return left, np.array(kept, dtype=np.complex128)
 
 
-def _swept(omega: FloatArray, roots: ComplexArray) -> FloatArray:
-    """Return the sum of th(w - r) over the roots."""
-    total = np.zeros(omega.size)
-    for root in roots.tolist():
-        angle = np.arctan2(omega - root.imag, abs(root.real))
-        total += -angle if root.real > 0.0 else angle
-    return total
+def _angle_of_gain(
+    source: KnownSource, channel: tuple[int, int], poles: ComplexArray, zeros: ComplexArray
+) -> float | None:
+    """Return the angle of k in ``H = k prod(s - z) / prod(s - p)``, from one real point; None where there is none."""
+    point = source.plane.gain_point(np.concatenate([poles, zeros]))
+    value = complex(source.response(*channel, np.array([point], dtype=np.complex128))[0])
+    if not np.isfinite(value) or value == 0.0:
+        return None
+    return float(np.angle(value) + np.angle(point - poles).sum() - np.angle(point - zeros).sum())
 
 
-def _sign_of_gain(source: Source, channel: tuple[int, int], poles: ComplexArray, zeros: ComplexArray) -> float:
-    """Return the sign of k in ``H = k prod(s - z) / prod(s - p)``, from one real point; 0 where there is none."""
-    sizes = np.abs(np.concatenate([poles, zeros]))
-    sizes = sizes[sizes > 0.0]
-    s = float(np.exp(np.log(sizes).mean())) * 1.1 if sizes.size else 1.0
-    value = complex(source.response(*channel, np.array([s], dtype=np.complex128))[0])
-    if not np.isfinite(value) or value.real == 0.0:
-        return 0.0
-    turn = np.exp(1j * (np.angle(s - poles).sum() - np.angle(s - zeros).sum()))
-    return float(np.sign((value * turn).real))
+def _by_work(model: SecondOrderModel, channel: tuple[int, int], values: ComplexArray) -> FloatArray | None:
+    """Return the phase of a motion at the place of its force; None for others, or where no damper takes the work."""
+    order = _derivative_at_force(model, *channel)
+    if order is None:
+        return None
+    middle = (order - 1) * np.pi / 2.0
+    phase = _on_turn(_angle(values), np.full(values.size, middle))
+    outside = np.abs(phase - middle) > np.pi / 2.0 + SIDE
+    return None if outside.any() else phase
+
+
+def _derivative_at_force(model: SecondOrderModel, output: int, source: int) -> int | None:
+    """Return which derivative of the motion at its own force an output is, of a symmetric model; else None."""
+    others = [as_sparse(part)[:, [source]] for part in (model.Bv, model.Ba)]
+    others += [as_sparse(part)[[output]][:, [source]] for part in (model.D, model.Dv, model.Da)]
+    if any([np.abs(part.data).any() for part in others]):  # noqa: C419
+        return None
+    force = as_sparse(model.B)[:, [source]].toarray()[:, 0]
+    rows = [as_sparse(part)[[output]].toarray()[0] for part in (model.F, model.G, model.H)]
+    there = [k for k, row in enumerate(rows) if row.any()]
+    if len(there) != 1 or not force.any() or np.iscomplexobj(force):
+        return None
+    row = rows[there[0]]
+    share = float(row @ force) / float(force @ force)
+    if share <= 0.0 or not np.array_equal(row, share * force):
+        return None
+    symmetric = all([abs(part - part.T).max() == 0.0 for part in map(as_sparse, (model.M, model.C, model.K))])  # noqa: C419
+    return there[0] if symmetric else None
 
 
 def _along_half_circles(
-    source: Source, poles: BoundedPoles, channel: tuple[int, int], omega: FloatArray, values: ComplexArray
+    source: KnownSource, poles: BoundedPoles | None, channel: tuple[int, int], omega: FloatArray, values: ComplexArray
 ) -> FloatArray | None:
-    """Follow the phase through the right half plane; None where values are missing at the start."""
+    """Follow the phase through the right half plane, from below the slowest pole; None where that fails."""
     there = np.flatnonzero((omega > 0.0) & np.isfinite(values) & (values != 0.0))
-    if there.size == 0 or there.size != np.count_nonzero(omega > 0.0):
+    if there.size == 0:
         return None
-    right = poles.values[poles.values.real > ON_AXIS * poles.bounds]
-    start = continuous_phase(values)[there[0]]
-    phase = np.full(omega.size, np.nan)
-    phase[omega == 0.0] = _angle(values)[omega == 0.0]
-    phase[there[0]] = start
-    for first, second in zip(there[:-1].tolist(), there[1:].tolist(), strict=True):
-        change = _change(source, channel, float(omega[first]), float(omega[second]))
-        if change is None:
-            return None
-        centre, radius = 0.5j * (omega[first] + omega[second]), 0.5 * (omega[second] - omega[first])
-        change -= 2.0 * np.pi * np.count_nonzero(np.abs(right - centre) < radius)
-        phase[second] = _on_turn(_angle(values[[second]]), np.array([phase[first] + change]))[0]
+    plane, right, first = source.plane, np.zeros(0, dtype=np.complex128), float(omega[there[0]])
+    slowest = first
+    if poles is not None:
+        roots = plane.on_boundary(poles.values, ON_AXIS * poles.bounds)
+        moving = plane.exponents(roots[~plane.at_start(roots)])
+        right = moving[moving.real > 0.0]
+        slowest = min(first, BELOW * float(np.abs(moving).min(initial=first / BELOW)))
+    nodes = np.append(slowest, omega[there])
+    changes = _changes(source, channel, nodes)
+    begin = _begin(source, channel, slowest) if poles is not None else continuous_phase(values)[there[0]]
+    if changes is None or begin is None:
+        return None
+    centres, radii = 0.5j * (nodes[1:] + nodes[:-1]), 0.5 * np.diff(nodes)
+    for root in right:
+        changes -= 2.0 * np.pi * (np.abs(root - centres) < radii)
+    angle = _angle(values)
+    phase = angle.copy()
+    phase[there] = _on_turn(angle[there], begin + np.cumsum(changes))
     return phase
 
 
-def _change(source: Source, channel: tuple[int, int], low: float, high: float) -> float | None:
-    """Return the change of the phase from j low to j high along half circles, each over a small ratio."""
-    pieces = max(1, int(np.ceil(np.log(high / low) / np.log(RATIO))))
-    ends = np.geomspace(low, high, pieces + 1)
+def _begin(source: KnownSource, channel: tuple[int, int], omega: float) -> float | None:
+    """Return the phase below the slowest pole, from the slope of the magnitude there."""
+    found = source.response(*channel, source.plane.points(1j * np.array([omega, 2.0 * omega])))
+    if not (np.isfinite(found) & (found != 0.0)).all():
+        return None
+    base = 0.5 * np.pi * float(np.round(np.log2(np.abs(found[1] / found[0]))))
+    angle = float(np.angle(found[0]))
+    rest = _start(base, angle - base, is_real=source.is_real)
+    return float(_on_turn(np.array([angle]), np.array([base + rest]))[0])
+
+
+def _changes(source: KnownSource, channel: tuple[int, int], nodes: FloatArray) -> FloatArray | None:
+    """Return the change of the phase between frequencies; None where it is not followed."""
+    turns = np.exp(1j * np.linspace(-np.pi / 2.0, np.pi / 2.0, ARC_POINTS))[1:-1]
+    paths, ends = [], []
+    for low, high in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True):
+        pieces = np.geomspace(low, high, max(1, int(np.ceil(np.log(high / low) / np.log(RATIO)))) + 1)
+        pieces[0], pieces[-1] = low, high
+        ends.append(pieces)
+        paths.append(_half_circles(pieces, turns))
+    found = source.response(*channel, source.plane.points(np.concatenate(paths)))
+    changes = np.empty(len(paths))
+    for k, part in enumerate(np.split(found, np.cumsum([path.size for path in paths])[:-1])):
+        with np.errstate(all="ignore"):
+            steps = np.angle(part[1:] / part[:-1])
+        if np.isfinite(steps).all() and np.abs(steps).max(initial=0.0) < STEP:
+            changes[k] = steps.sum()
+            continue
+        change = _finer_change(source, channel, ends[k])
+        if change is None:
+            return None
+        changes[k] = change
+    return changes
+
+
+def _half_circles(ends: FloatArray, turns: ComplexArray) -> ComplexArray:
+    """Return points from j times the first end to the last, along half circles to the right of the axis."""
+    path = [np.array([1j * ends[0]])]
+    for low, high in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True):
+        path += [0.5j * (low + high) + 0.5 * (high - low) * turns, np.array([1j * high])]
+    return np.concatenate(path)
+
+
+def _finer_change(source: KnownSource, channel: tuple[int, int], ends: FloatArray) -> float | None:
+    """Return the change of the phase over an interval from more and more points."""
     count = ARC_POINTS
     for _ in range(HALVINGS):
         turns = np.exp(1j * np.linspace(-np.pi / 2.0, np.pi / 2.0, count))[1:-1]
-        centres, radii = 0.5j * (ends[1:] + ends[:-1]), 0.5 * np.diff(ends)
-        path = [np.array([1j * ends[0]])]
-        for centre, radius, end in zip(centres, radii, ends[1:], strict=True):
-            path += [centre + radius * turns, np.array([1j * end])]
-        found = source.response(*channel, np.concatenate(path))
-        if not (np.isfinite(found) & (found != 0.0)).all():
-            ends = np.geomspace(low, high, len(ends) + 1)
-            ends[0], ends[-1] = low, high
+        found = source.response(*channel, source.plane.points(_half_circles(ends, turns)))
+        if (np.isfinite(found) & (found != 0.0)).all():
+            steps = np.angle(found[1:] / found[:-1])
+            if np.abs(steps).max() < STEP:
+                return float(steps.sum())
+            count = 2 * count - 1
             continue
-        steps = np.angle(found[1:] / found[:-1])
-        if np.abs(steps).max() < STEP:
-            return float(steps.sum())
-        count = 2 * count - 1
+        finer = np.geomspace(ends[0], ends[-1], len(ends) + 1)
+        finer[0], finer[-1] = ends[0], ends[-1]
+        ends = finer
     return None

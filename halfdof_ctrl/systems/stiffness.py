@@ -32,7 +32,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, checked_frequencies
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
-from halfdof_ctrl.systems.phase import Source, source_of, with_source
+from halfdof_ctrl.systems.phase_sources import Source, source_of, with_source
 from halfdof_ctrl.systems.seen_modes import Response, seen_poles
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]

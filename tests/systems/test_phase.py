@@ -22,7 +22,7 @@ from halfdof_ctrl import (
     save_response,
     transmissibility_response,
 )
-from halfdof_ctrl.systems import phase
+from halfdof_ctrl.systems import phase, phase_sources
 from halfdof_ctrl.systems.phase import response_phase
 from support.structures import Structure, damped_structures
 
@@ -73,7 +73,7 @@ def test_half_circles_agree_with_poles_and_zeros() -> None:
     """The way through the right half plane, which knows of no zero, gives the same phase of a transfer receptance."""
     model = chain(5, 0.05).select("F_q0", "q3")
     data = frequency_response(model, [0.1, 0.9, 1.3, 1.9, 7.0])
-    source = getattr(data, phase.SOURCE)
+    source = getattr(data, phase_sources.SOURCE)
     arguments = (source, source.poles(), (0, 0), np.asarray(data.omega), np.asarray(data.frdata)[0, 0])
     by_roots, by_circles = phase._by_roots(*arguments), phase._along_half_circles(*arguments)
     assert by_roots is not None
@@ -86,7 +86,7 @@ def test_wrong_zeros_are_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     model = chain(5, 0.05).select("F_q0", "q1")
     data = frequency_response(model, np.geomspace(0.1, 10.0, 15))
     desired = degrees(data)
-    monkeypatch.setattr(phase, "descriptor_zeros", lambda *_: np.zeros(0, dtype=complex))
+    monkeypatch.setattr(phase_sources, "descriptor_zeros", lambda *_: np.zeros(0, dtype=complex))
     assert_allclose(degrees(data), desired, atol=1e-9)
 
 
