@@ -20,15 +20,17 @@ import numpy.typing as npt
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.phase_sources import SOURCE, KnownSource, LargeSource, Source
+from halfdof_ctrl.systems.phase_sources import SOURCE, KnownSource, LargeSource, Plane, Source
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 ON_AXIS = 4.0  #: times its bound: a pole nearer to the axis is on it
 ZERO_ON_AXIS = 1e-9  #: of its size: a zero nearer to the axis is on it
 CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a motion that is not reached
+SAME = 1e-15  #: of its size: poles and zeros nearer than this are at one place
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
-BESIDE = 1e-9  #: relative distance to a root on the axis within which the angle says nothing
+BESIDE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
+BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
 POLE_EFFORT = 1.1e9  #: cubed size up to which poles are computed
 ZERO_EFFORT = 3e8  #: channels times cubed size up to which zeros are computed
 CIRCLE_EFFORT = 2e10  #: channels times frequencies times squared size up to which half circles are followed
@@ -102,9 +104,9 @@ def _by_roots(
 ) -> FloatArray | None:
     """Return the phase from poles and zeros, None where it does not agree with the values."""
     plane, zeros = source.plane, source.zeros(*channel)
-    left, zeros = _without_common(poles, zeros)
-    p = plane.on_boundary(poles.values[left], ON_AXIS * poles.bounds[left])
+    p = plane.on_boundary(poles.values, ON_AXIS * poles.bounds)
     z = plane.on_boundary(zeros, ZERO_ON_AXIS * np.abs(zeros))
+    p, z, close = _without_common(p, ON_AXIS * poles.bounds, z, plane)
     gain = _angle_of_gain(source, channel, p, z)
     if gain is None:
         return None
@@ -116,8 +118,9 @@ def _by_roots(
     phi = plane.swept(omega, z) - plane.swept(omega, p) - begin + rest
     angle = _angle(values)
     away = np.ones(omega.size, dtype=bool)
-    for root in np.concatenate([plane.touching(p), plane.touching(z)]):
-        away &= np.abs(omega - root.imag) > BESIDE * omega
+    for roots, beside in ((p, BESIDE), (np.append(z, close), BESIDE_ZERO)):
+        for root in plane.touching(roots):
+            away &= np.abs(omega - root.imag) > beside * omega
     difference = np.abs(_wrapped(angle - phi))[away]
     if not np.nan_to_num(difference).max(initial=0.0) < AGREES:
         return None
@@ -135,19 +138,30 @@ def _start(base: float, rest: float, *, is_real: bool) -> float:
     return low + 2.0 * np.pi if abs(base + low + 2.0 * np.pi) < abs(base + low) - TIED else low
 
 
-def _without_common(poles: BoundedPoles, zeros: ComplexArray) -> tuple[list[int], ComplexArray]:
-    """Take out zeros with the poles that they cancel; return the places of the poles left."""
-    left, kept = list(range(poles.values.size)), []
+def _without_common(
+    poles: ComplexArray, doubts: FloatArray, zeros: ComplexArray, plane: Plane
+) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
+    """Take out zeros with the poles that they cancel; return the poles and zeros left, and those left on the boundary.
+
+    On the boundary a pole and a zero side by side turn the phase between them, and cancel elsewhere by themselves.
+    """
+    left, kept, close = list(range(poles.size)), [], []
     for zero in zeros.tolist():
         places = np.array(left, dtype=np.intp)
-        apart = np.abs(poles.values[places] - zero)
-        allowed = np.maximum(CANCELLED * abs(zero), ON_AXIS * poles.bounds[places] * (zero != 0.0))
+        apart = np.abs(poles[places] - zero)
+        allowed = np.maximum(CANCELLED * abs(zero), doubts[places] * (zero != 0.0))
         near = np.flatnonzero(apart <= allowed)
-        if near.size:
-            left.pop(int(near[apart[near].argmin()]))
-        else:
+        if near.size == 0:
             kept.append(zero)
-    return left, np.array(kept, dtype=np.complex128)
+            continue
+        place = int(near[apart[near].argmin()])
+        pair = np.array([poles[left[place]], zero])
+        if apart[place] > doubts[left[place]] + SAME * abs(zero) and plane.touching(pair).size == pair.size:
+            kept.append(zero)
+            close.append(zero)
+        else:
+            left.pop(place)
+    return poles[left], np.array(kept, dtype=np.complex128), np.array(close, dtype=np.complex128)
 
 
 def _angle_of_gain(
@@ -235,8 +249,11 @@ def _changes(source: KnownSource, channel: tuple[int, int], nodes: FloatArray) -
     turns = np.exp(1j * np.linspace(-np.pi / 2.0, np.pi / 2.0, ARC_POINTS))[1:-1]
     paths, ends = [], []
     for low, high in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True):
-        pieces = np.geomspace(low, high, max(1, int(np.ceil(np.log(high / low) / np.log(RATIO)))) + 1)
-        pieces[0], pieces[-1] = low, high
+        count = int(np.ceil(np.log(high / low) / np.log(RATIO)))
+        pieces = np.array([low, high])
+        if count > 1:
+            pieces = low * (high / low) ** np.linspace(0.0, 1.0, count + 1)
+            pieces[-1] = high
         ends.append(pieces)
         paths.append(_half_circles(pieces, turns))
     found = source.response(*channel, source.plane.points(np.concatenate(paths)))
