@@ -35,7 +35,7 @@ from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.phase_sources import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
-from halfdof_ctrl.systems.seen_modes import SeenModes, seen_poles
+from halfdof_ctrl.systems.seen_modes import MOST_CIRCLED, SeenModes, seen_by_vectors, seen_poles
 from halfdof_ctrl.systems.state_space import energy_state_space, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
@@ -49,7 +49,6 @@ NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
 POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
 ZERO_EFFORT = 1e7  #: channels times cubed size up to which the grid is refined at zeros
-MOST_CIRCLED = 400  #: states up to which poles count by their residues
 DISCRETE_ORIGIN = 1e-12  #: |log z| of a pole at 1 that rounding has moved
 
 
@@ -227,8 +226,7 @@ def system_modes(
     A, D = data.A, data.D
     poles = bounded_poles(A) if model is None else poles_of_model(model, A)
     if len(A) > MOST_CIRCLED:
-        every = np.ones(poles.values.size, dtype=bool)
-        return SeenModes(poles.values, poles.bounds, every, every), np.zeros(0, dtype=np.complex128)
+        return seen_by_vectors(*data, poles), np.zeros(0, dtype=np.complex128)
     p, m = D.shape
     zeros = [np.zeros(0, dtype=np.complex128)]
     if p * m * len(A) ** 3 <= ZERO_EFFORT:

@@ -24,6 +24,7 @@ STEPS = 4  #: inverse iterations at most
 COARSE = 1e-3  #: a correction above this part of the eigenvalue calls for an iteration ...
 DAMPING = 0.1  #: ... or above this part of its real part, which a picture of its peak rests on ...
 RESOLVED = 1e-11  #: ... unless it is below this part of the eigenvalue
+MOST_REFINED = 150  #: states up to which the digits of the damping alone, or a bound, call for one
 STEP = 4.0  #: an iteration that moves the eigenvalue farther, in units of its doubt or its size, went to another one
 
 
@@ -80,7 +81,7 @@ def _with_bounds(
     correction, data = _first_order(A, values[upper], v, w)
     for k, place in enumerate(upper.tolist()):
         value, step, rounding = complex(values[place]), complex(correction[k]), float(data[k])
-        if _is_coarse(value, step, rounding):
+        if _is_coarse(value, step, rounding, fine=len(A) <= MOST_REFINED):
             value, step, rounding = _iterated(A, value, (v[:, k], w[:, k]), step, rounding)
         doubt = abs(step)
         if doubt <= STEP * max(rounding, COARSE * abs(value)):
@@ -96,11 +97,11 @@ def _mirror(values: ComplexArray, upper: npt.NDArray[np.intp], found: ComplexArr
         found[place + 1], bounds[place + 1] = found[place].conjugate(), bounds[place]
 
 
-def _is_coarse(value: complex, step: complex, rounding: float) -> bool:
+def _is_coarse(value: complex, step: complex, rounding: float, *, fine: bool = True) -> bool:
     size = abs(step)
-    if max(size, rounding) > COARSE * abs(value):
+    if max(size, rounding if fine else 0.0) > COARSE * abs(value):
         return True
-    return size > DAMPING * abs(value.real) and size > RESOLVED * abs(value)
+    return fine and size > DAMPING * abs(value.real) and size > RESOLVED * abs(value)
 
 
 def _iterated(

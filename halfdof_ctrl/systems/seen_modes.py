@@ -15,8 +15,10 @@ from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 
@@ -30,6 +32,7 @@ AROUND = 3.0  #: radius of a circle, of the spread of a cluster
 CIRCLE_ROUNDING = 64.0 * UNIT_ROUNDOFF  #: of the largest |H| on a circle: coefficients below are none
 VISIBLE = 1e-3  #: part of the rest of H that a pole adds where it adds most
 MOST_TERMS = 8  #: of a principal part
+MOST_CIRCLED = 200  #: states up to which circles are drawn around the poles
 NO_CHANNEL = 1e-12  #: channels that move less than this part of the largest are rounding
 
 
@@ -80,6 +83,8 @@ def seen_modes(
     [(-1+0j)]
     """
     found = bounded_poles(A) if poles is None else poles
+    if len(A) > MOST_CIRCLED:
+        return seen_by_vectors(A, B, C, D, found)
     return seen_poles(found, lambda points: state_space_response(A, B, C, D, points), np.abs(D))
 
 
@@ -120,6 +125,59 @@ def seen_poles(poles: BoundedPoles, response: Response, direct: FloatArray, *, r
     if real:
         frequency, step = _mirrored(values, frequency), _mirrored(values, step)
     return SeenModes(values, poles.bounds, frequency, step)
+
+
+def seen_by_vectors(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, poles: BoundedPoles) -> SeenModes:
+    """Find which poles of a large continuous state space are seen, by residues from eigenvectors.
+
+    Cheaper than `seen_modes` where there are hundreds of states: one decomposition gives the residues
+    ``(C v)(w^H B) / (w^H v)`` of all, and H is their sum. Multiple poles count together.
+
+    Parameters
+    ----------
+    A, B, C, D : (N, N), (N, m), (p, N), (p, m) ndarrays
+    poles : BoundedPoles
+        Eigenvalues of A.
+
+    Returns
+    -------
+    SeenModes
+
+    Examples
+    --------
+    >>> A, B, C = np.diag([-1.0, -1e-6]), np.ones((2, 1)), np.array([[1.0, 0.0]])
+    >>> seen_by_vectors(A, B, C, np.zeros((1, 1)), bounded_poles(A)).moving.tolist()
+    [(-1+0j)]
+    """
+    matrix, scale = balanced_states(A)
+    found = scipy.linalg.eig(matrix, left=True, right=True)
+    values, left, right = (np.asarray(part, dtype=np.complex128) for part in found)
+    product = np.einsum("ik,ik->k", left.conj(), right)
+    with np.errstate(all="ignore"):
+        out, drive = (C * scale) @ right, (left.conj().T @ (B / scale[:, None])) / product[:, None]
+    out, drive = np.nan_to_num(out), np.nan_to_num(drive)
+    nearest = np.abs(poles.values[:, None] - values).argmin(axis=1)
+    clusters = _clusters(poles.values, poles.bounds, real=True)
+    frequency, step = np.tile(poles.values == 0.0, (2, 1))
+    steps = np.zeros((*D.shape, len(clusters)))
+    for k, cluster in enumerate(clusters):
+        with np.errstate(all="ignore"):
+            whole = D + (out / (cluster.top - values)) @ drive
+        own = np.zeros(D.shape, dtype=np.complex128)
+        for place in nearest[cluster.places].tolist():
+            residue = np.outer(out[:, place], drive[place])
+            with np.errstate(all="ignore"):
+                own += residue / (cluster.top - values[place])
+                if values[place].imag != 0.0:
+                    own += residue.conj() / (cluster.top - values[place].conjugate())
+                steps[:, :, k] += np.abs(residue) / np.abs(values[place])
+        with np.errstate(all="ignore"):
+            shown = ~np.isfinite(whole) | ~np.isfinite(own) | (np.abs(own) > VISIBLE * np.abs(whole - own))
+        frequency[cluster.places] = bool((shown & (own != 0.0)).any())
+    step |= _in_step(np.nan_to_num(steps), np.abs(D), clusters, poles.values.size)
+    return SeenModes(
+        poles.values, poles.bounds, _mirrored(poles.values, frequency), _mirrored(poles.values, step)
+    )
 
 
 def _clusters(values: ComplexArray, bounds: FloatArray, *, real: bool) -> list[_Cluster]:
