@@ -26,7 +26,7 @@ from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.reduction.modal.modes import ShiftedStiffness, is_unsymmetric, lowest_modes
+from halfdof_ctrl.reduction.modal.modes import Modes, ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visible_zeros
 from halfdof_ctrl.systems.doors import checked_system
@@ -35,7 +35,14 @@ from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.phase_sources import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
-from halfdof_ctrl.systems.seen_modes import MOST_CIRCLED, SeenModes, seen_by_vectors, seen_poles
+from halfdof_ctrl.systems.seen_modes import (
+    MOST_CIRCLED,
+    NO_CHANNEL,
+    VISIBLE,
+    SeenModes,
+    seen_by_vectors,
+    seen_poles,
+)
 from halfdof_ctrl.systems.state_space import energy_state_space, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.working_states import response_of_model, working_form
@@ -44,7 +51,10 @@ SYSTEM_OR_MODEL = "a model of mechss or a control.StateSpace"  #: what a frequen
 HIGHEST = 1e150  #: [rad/s] of a frequency, whose square times a mass must be a number
 DEFAULT_POINTS = 1000  #: frequencies between limits that are given
 FEW_POINTS = 200  #: the same for a sparse model with many states, each a factorization
-GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to
+GRID_MODES = 12  #: lowest modes that the default grid of such a model reaches to ...
+MORE_MODES = 48  #: ... chosen among so many where channels show few of them
+FEWEST_SHOWN = 6  #: modes that are enough to choose among
+NEAR_PEAKS = np.array([0.98, 0.999, 1.0001, 1.001, 1.02])  #: frequencies around each of them, in parts of it
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
 POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
@@ -200,7 +210,8 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         except NoStateSpaceError:
             pass
     omega = _lowest_frequencies(model)
-    return np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS)
+    near = (omega[:, None] * NEAR_PEAKS).ravel()
+    return np.union1d(np.geomspace(omega[0] / MARGIN, omega[-1] * NEXT_MODE, FEW_POINTS - near.size), near)
 
 
 def descriptor_modes(model: SecondOrderModel) -> tuple[SeenModes, ComplexArray]:
@@ -249,20 +260,44 @@ def _grid(modes: SeenModes, zeros: ComplexArray) -> FloatArray:
 
 
 def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
-    """Return the lowest natural frequencies [rad/s] that are not zero, without damping."""
+    """Return the lowest natural frequencies [rad/s] that some channel shows and that are not zero."""
     K, M = as_sparse(model.K), as_sparse(model.M)
-    omega = np.zeros(0)
+    moving = np.zeros(0)
     if not (model.is_complex or is_unsymmetric(K) or is_unsymmetric(M)):
         with limited_threads(1):
             stiffness = ShiftedStiffness.factorized(K, M)
-            if stiffness is not None:
-                omega = lowest_modes(stiffness, GRID_MODES).omega
-    moving = np.asarray(omega[omega > POLE_AT_ORIGIN * omega.max(initial=0.0)])
+            for count in (GRID_MODES, MORE_MODES) if stiffness is not None else ():
+                modes = lowest_modes(stiffness, count)
+                seen = modes.omega[_shown_modes(model, modes)]
+                moving = np.asarray(seen[seen > POLE_AT_ORIGIN * modes.omega.max(initial=0.0)])[:GRID_MODES]
+                if moving.size >= FEWEST_SHOWN or modes.omega.size < count:
+                    break
     if moving.size == 0:
         require_regular(model)
-        msg = "There are no default frequencies for this sparse model, which has no real modes. Give omega [rad/s]."
+        msg = (
+            "There are no default frequencies for this sparse model, of whose lowest real modes its inputs and outputs "
+            "show none. Give omega [rad/s]."
+        )
         raise ParameterError(msg, parameter="omega", value=None)
     return moving
+
+
+def _shown_modes(model: SecondOrderModel, modes: Modes) -> npt.NDArray[np.bool_]:
+    """Tell which modes add to some channel, at their peak, more than a thousandth of what the others do."""
+    phi, omega = modes.shapes, modes.omega
+    F, G, H, C = (as_sparse(part) for part in (model.F, model.G, model.H, model.C))
+    out = np.abs(F @ phi) + omega * np.abs(G @ phi) + omega**2 * np.abs(H @ phi)
+    B, Bv, Ba = (as_sparse(part).T for part in (model.B, model.Bv, model.Ba))
+    drive = np.abs(B @ phi) + omega * np.abs(Bv @ phi) + omega**2 * np.abs(Ba @ phi)
+    damped = np.einsum("ij,ij->j", phi, C @ phi)
+    shown = np.zeros(omega.size, dtype=bool)
+    for i, j in np.ndindex(len(out), len(drive)):
+        with np.errstate(all="ignore"):
+            weight = np.nan_to_num(out[i] * drive[j] / omega**2)
+            peak = np.where(damped > 0.0, weight * np.maximum(omega / damped, 1.0), np.inf)
+        rest = weight.sum() - weight
+        shown |= (weight > NO_CHANNEL * weight.max(initial=0.0)) & (peak > VISIBLE * rest)
+    return shown
 
 
 def system_frequencies(sys: control.StateSpace, model: SecondOrderModel | None = None) -> FloatArray:
