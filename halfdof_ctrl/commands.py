@@ -43,7 +43,6 @@ from halfdof_ctrl.plots.figure_files import save_figure
 from halfdof_ctrl.plots.step import MOST_RECOVERED
 from halfdof_ctrl.plots.stiffness import Scale
 from halfdof_ctrl.reduction.choose import exact_reduction
-from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.report import check_as_json, default_design, write_report
 from halfdof_ctrl.systems.crosscheck import crosscheck
 from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
@@ -116,10 +115,6 @@ def run_info(arguments: argparse.Namespace) -> int:
         kind = "regular" if structure.is_regular else "SINGULAR"
         finite, infinite = structure.finite_eigenvalues.size, structure.n_infinite
         print(f"Pencil: {kind}, {finite} finite and {infinite} infinite eigenvalues, index {structure.index}")
-        form = energy_system(model)
-        if form is not None and form.n_rigid:
-            zeros = int(np.count_nonzero(np.linalg.eigvals(form.A) == 0.0))
-            print(f"Free motions: {form.n_rigid}, {zeros} poles at exactly 0, so that some static response is infinite")
     try:
         reduction = exact_reduction(model)
         print(reduction)
@@ -177,7 +172,9 @@ def run_stiffness(arguments: argparse.Namespace) -> int:
         save_response(dynamic_stiffness_response(model, dof, grid() if omega is None else omega), arguments.o)
     else:
         scale: Scale = "log" if arguments.log else "linear"
-        plot = dynamic_stiffness_plot(model, dof, omega, xscale=scale, yscale=scale, dB=arguments.db)
+        plot = dynamic_stiffness_plot(
+            model, dof, omega, xscale="log" if arguments.log else None, yscale=scale, dB=arguments.db
+        )
         save_figure(plot, arguments.o)
     return DONE
 

@@ -146,13 +146,15 @@ def label_y(ax: Axes, text: str) -> None:
         ax.set_ylabel(text)
 
 
-def usual_largest(ax: Axes, part: float) -> float:
-    """Return the size that a part of the width of a plot stays below, for all its curves with positive values.
+def usual_sizes(ax: Axes, part: float) -> tuple[float, float]:
+    """Return the sizes that a part of the width of a plot stays above, and below, for all its curves.
 
-    Points weigh by the width between them, since grids are dense at resonances.
+    Points weigh by the width between them, since grids are dense at resonances; markers do not count.
     """
-    sizes, widths = [], []
+    sizes, widths = [np.zeros(0)], [np.zeros(0)]
     for line in ax.get_lines():
+        if line.get_linestyle() == "None":
+            continue
         x, y = (np.asarray(data, dtype=float) for data in (line.get_xdata(), line.get_ydata()))
         places = np.log(x, where=x > 0.0, out=np.full(x.size, np.nan))
         width = np.abs(np.gradient(places)) if x.size > 1 else np.ones(x.size)
@@ -163,8 +165,9 @@ def usual_largest(ax: Axes, part: float) -> float:
     order = np.argsort(every)
     total = np.cumsum(weights[order])
     if total.size == 0 or total[-1] <= 0.0:
-        return float(every.max(initial=0.0))
-    return float(every[order][np.searchsorted(total, part * total[-1])])
+        return float(every.min(initial=np.inf)), float(every.max(initial=0.0))
+    least, most = np.searchsorted(total, np.array([1.0 - part, part]) * total[-1])
+    return float(every[order][least]), float(every[order][most])
 
 
 def draw_grid(axes: Iterable[Axes], *, on: bool) -> None:

@@ -30,7 +30,7 @@ from halfdof_ctrl.plots.axes import (
     no_lines,
     prepared_axes,
     require_system,
-    usual_largest,
+    usual_sizes,
 )
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_label, signal_names
 from halfdof_ctrl.systems.frequency import (
@@ -172,7 +172,7 @@ def bode_plot(
         if exact is not None:
             style = {"label": prefix + "descriptor form", "markersize": 5.0, **CIRCLE}
             lines[2 * i, j] += above.plot(x[marks], scales.magnitude(exact[i, j]), **style)
-            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase[marks])), **style)
+            lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase, marks)), **style)
     dress_bode(axes, curve, sysdata, known, scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
@@ -259,7 +259,7 @@ def dress_bode(
 
 
 def _set_logarithmic(ax: Axes) -> None:
-    """Make the magnitude's axis logarithmic; undamped resonances leave it at the top and do not flatten the rest."""
+    """Make the magnitude's axis logarithmic; undamped resonances and antiresonances leave it and do not flatten the rest."""
     curve = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     curve = curve[np.isfinite(curve) & (curve > 0.0)]
     if curve.size == 0:
@@ -267,9 +267,11 @@ def _set_logarithmic(ax: Axes) -> None:
     if curve.max() <= FLAT_RATIO * curve.min():
         ax.set_ylim(curve.min() / FLAT_ROOM, curve.max() * FLAT_ROOM)
     ax.set_yscale("log")
-    usual = usual_largest(ax, USUAL_WIDTH)
-    if ax.dataLim.y1 > RESONANCE_SPIKE * usual:
-        ax.set_ylim(top=np.sqrt(RESONANCE_SPIKE) * usual)
+    least, most = usual_sizes(ax, USUAL_WIDTH)
+    if curve.max() > RESONANCE_SPIKE * most:
+        ax.set_ylim(top=np.sqrt(RESONANCE_SPIKE) * most)
+    if curve.min() < least / RESONANCE_SPIKE:
+        ax.set_ylim(bottom=least / np.sqrt(RESONANCE_SPIKE))
 
 
 def _set_phase_ticks(ax: Axes) -> None:

@@ -76,7 +76,7 @@ def draw_pole_grid(ax: Axes) -> None:
         _draw_mirrored(ax, ray)
         side = "left" if end[0] < 0.5 else "center"  # noqa: PLR2004
         ax.text(end[0] + 0.005, end[1] - 0.008, f"ζ = {zeta:g}", transform=ax.transAxes, ha=side, va="top", **TEXT)
-    small = np.geomspace(1e-9, np.pi / 4.0, 150)
+    small = np.geomspace(1e-16, np.pi / 4.0, 250)
     angles = np.concatenate([np.pi / 2.0 + small, np.pi - small[::-1]])
     last = np.full(2, np.inf)
     for radius in _natural_frequencies(ax, reach):

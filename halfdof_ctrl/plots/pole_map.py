@@ -162,6 +162,8 @@ def draw_plane(ax: Axes, *, grid: bool, discrete: bool) -> None:
     right = ax.get_xlim()[1]
     ax.axvline(0.0, label="_boundary", **boundary)
     ax.axvspan(0.0, right, facecolor="C3", alpha=0.07, zorder=0.5)
+    if ax.get_xscale() == "linear":
+        ax.ticklabel_format(style="sci", scilimits=(-3, 5), useMathText=True)
     ax.set_xlabel("real part of s [rad/s]   (shaded: unstable)")
     ax.set_ylabel("imaginary part of s [rad/s]")
     if grid:

@@ -26,9 +26,12 @@ from halfdof_ctrl.plots.axes import (
 from halfdof_ctrl.plots.units import Units, known_units, plain, signal_label, signal_names, typeset
 from halfdof_ctrl.reduction.choose import exact_reduction
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems.frequency import DISCRETE_ORIGIN
+from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
 from halfdof_ctrl.systems.time_response import checked_times, step_response
 
+FEWEST_SAMPLES, MOST_SAMPLES = 10, 5000  #: of the response of a discrete system
 NAMED_LINES = 8  #: recovered DOFs that the legend names
 MOST_RECOVERED = 200  #: DOFs of a sparse model up to which those without inertia are drawn
 
@@ -55,7 +58,7 @@ def step_plot(
         than 200 DOFs.
     timepts : (k,) array_like or float, optional
         Equidistant times [s], or the last time. By default `step_times` of the modes that are seen in the
-        plot; python-control's own choice for a discrete-time system.
+        plot, for a discrete-time system of ``log(z) / dt`` of its poles.
     ax : (rows, m) array_like of Axes, optional
         p outputs in rows, and a row for the recovered displacements of each unit, if there are any; m inputs
         in columns.
@@ -126,8 +129,20 @@ def _times(sys: control.StateSpace, timepts: npt.ArrayLike | None) -> FloatArray
         return checked_times(timepts)
     horizon = None if timepts is None else float(np.asarray(timepts))
     if sys.isdtime(strict=True):
-        return horizon
+        return horizon if horizon is not None else _sampled_horizon(sys)
     return step_times(relevant_poles(sys.A, sys.B, sys.C, sys.D), horizon)
+
+
+def _sampled_horizon(sys: control.StateSpace) -> float | None:
+    """Return the last time at which a discrete system is looked at, by s = log(z) / dt of its poles."""
+    dt = float(sys.dt)
+    poles = bounded_poles(np.asarray(sys.A, dtype=float)).values
+    slow = np.log(poles[poles != 0.0]) / dt
+    slow = np.where(np.abs(slow) * dt <= DISCRETE_ORIGIN, 0.0, slow)
+    if slow.size == 0 or not np.isfinite(slow).all():
+        return None
+    steps = int(np.clip(np.ceil(step_times(slow)[-1] / dt), FEWEST_SAMPLES, MOST_SAMPLES))
+    return steps * dt
 
 
 def _panels(reduction: ExactReduction | None, units: dict[str, str]) -> dict[str, list[str]]:
@@ -163,7 +178,9 @@ def _dress(axes: AxesArray, sys: control.StateSpace | SecondOrderModel, units: d
         axes[-1, j].set_xlabel(f"time after the step {step} {time_unit}")
     for ax in axes.flat:
         ax.ticklabel_format(axis="y", style="sci", scilimits=(-2, 4), useMathText=True)
-        ax.yaxis.get_offset_text().set_fontsize("small")
+        ax.ticklabel_format(axis="x", style="sci", scilimits=(-3, 5), useMathText=True)
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.get_offset_text().set_fontsize("small")
         ax.margins(x=0.0)
     draw_grid(list(axes.flat), on=grid)
     axes[0, 0].figure.align_ylabels(list(axes.flat))

@@ -23,13 +23,14 @@ from halfdof_ctrl.plots.axes import (
     label_y,
     no_lines,
     prepared_axes,
-    usual_largest,
+    usual_sizes,
 )
 from halfdof_ctrl.plots.units import Units, known_units, plain, ratio_unit
 from halfdof_ctrl.systems.phase import response_phase
 from halfdof_ctrl.systems.stiffness import (
     TransmissibilityKind,
     dynamic_stiffness_response,
+    evenly_from_zero,
     motion_frequencies,
     transmissibility_response,
 )
@@ -46,6 +47,7 @@ ANGLE_STEPS = {
 WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
 STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
 ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
+WIDE_RANGE = 1e4  #: ratio of the ends of a default grid, each a factor of 10 off the modes, from which it is logarithmic
 CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
 
 
@@ -55,7 +57,7 @@ def dynamic_stiffness_plot(
     omega: npt.ArrayLike | None = None,
     *,
     ax: AxesLike = None,
-    xscale: Scale = "linear",
+    xscale: Scale | None = None,
     yscale: Scale = "linear",
     Hz: bool = True,
     dB: bool = False,
@@ -77,8 +79,9 @@ def dynamic_stiffness_plot(
         `~halfdof_ctrl.systems.stiffness.motion_frequencies`.
     ax : (2,) array_like of Axes, optional
         For the modulus and the loss angle.
-    xscale, yscale : {"linear", "log"}
-        Axes of the frequency and of the modulus.
+    xscale, yscale : {"linear", "log"}, optional
+        Axes of the frequency and of the modulus. By default they are linear, the frequency logarithmic where modes are
+        seen that are more than a factor of 100 apart.
     Hz : bool
         Frequency axis in Hz, else in rad/s.
     dB : bool
@@ -115,9 +118,13 @@ def dynamic_stiffness_plot(
     require_texts(title=title)
     require_switches(Hz=Hz, dB=dB, grid=grid)
     models, texts = _models(sysdata, label)
-    _require_scales(xscale, yscale)
+    _require_scales(xscale or "linear", yscale)
     if omega is None:
-        omega = motion_frequencies(models, dof, free=True, linear=xscale == "linear")
+        given = motion_frequencies(models, dof, free=True)
+        if xscale is None:
+            xscale = "log" if given[-1] > WIDE_RANGE * given[0] else "linear"
+        omega = evenly_from_zero(given) if xscale == "linear" else given
+    xscale = xscale or "linear"
     responses = [dynamic_stiffness_response(model, dof, omega) for model in models]
     names = as_tuple(dof)
     unit = _ratio_unit(models[0], units, force_names(names), names)
@@ -305,11 +312,13 @@ def _set_magnitude(ax: Axes, scale: Scale) -> None:
     if curve.size == 0:
         return
     ax.set_yscale(scale)
-    usual = usual_largest(ax, USUAL_WIDTH)
+    least, usual = usual_sizes(ax, USUAL_WIDTH)
     if curve.max() - curve.min() <= CONSTANT_SPAN * curve.max():
         ax.set_ylim(curve.mean() / 2.0, curve.mean() * 2.0)
     elif curve.max() > STIFFNESS_SPIKE[scale] * usual:
         ax.set_ylim(top=ROOM_ABOVE[scale] * usual)
+    if scale == "log" and curve.min() < least / STIFFNESS_SPIKE[scale]:
+        ax.set_ylim(bottom=least / ROOM_ABOVE[scale])
     if scale == "linear" and ax.get_ylim()[0] < 0.0:
         ax.set_ylim(bottom=0.0)
 

@@ -59,6 +59,7 @@ NEXT_MODE = 1.2  #: it ends this factor above the last of them
 MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
 POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
 ZERO_EFFORT = 1e7  #: channels times cubed size up to which the grid is refined at zeros
+NYQUIST_SHARE = 0.999  #: of the Nyquist frequency that grids of discrete systems reach
 DISCRETE_ORIGIN = 1e-12  #: |log z| of a pole at 1 that rounding has moved
 
 
@@ -301,14 +302,15 @@ def _shown_modes(model: SecondOrderModel, modes: Modes) -> npt.NDArray[np.bool_]
 
 
 def system_frequencies(sys: control.StateSpace, model: SecondOrderModel | None = None) -> FloatArray:
-    """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency."""
+    """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency, nearly."""
     if not sys.isdtime(strict=True):
         return _grid(*system_modes(sys, model=model))
     dt = float(sys.dt)
     poles = bounded_poles(np.asarray(sys.A, dtype=float)).values
     slow = np.log(poles[poles != 0.0]) / dt
     frequencies = default_frequencies(slow[np.abs(slow) * dt > DISCRETE_ORIGIN])
-    return np.append(frequencies[frequencies < np.pi / dt], np.pi / dt)
+    top = NYQUIST_SHARE * np.pi / dt  # where sampled systems have a zero, and values are rounding
+    return np.append(frequencies[frequencies < top], top)
 
 
 def checked_frequencies(omega: npt.ArrayLike) -> FloatArray:

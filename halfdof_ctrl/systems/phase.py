@@ -29,10 +29,11 @@ ZERO_ON_AXIS = 1e-9  #: of its size: a zero nearer to the axis is on it
 CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a motion that is not reached
 SAME = 1e-15  #: of its size: poles and zeros nearer than this are at one place
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
-BESIDE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
+BESIDE_POLE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
 BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
 POLE_EFFORT = 1.1e9  #: cubed size up to which poles are computed
 ZERO_EFFORT = 3e8  #: channels times cubed size up to which zeros are computed
+BOTH_SIDES = (1.0 - 4.0 * BESIDE_ZERO, 1.0 + 4.0 * BESIDE_ZERO)
 CIRCLE_EFFORT = 1e8  #: channels times frequencies times squared size up to which half circles are followed
 RATIO = 1.2  #: of the ends of an interval that a half circle spans
 STEP = np.pi / 3.0  #: [rad] largest change between points of a half circle
@@ -118,13 +119,19 @@ def _by_roots(
     phi = plane.swept(omega, z) - plane.swept(omega, p) - begin + rest
     angle = _angle(values)
     away = np.ones(omega.size, dtype=bool)
-    for roots, beside in ((p, BESIDE), (np.append(z, close), BESIDE_ZERO)):
+    for roots, beside in ((p, BESIDE_POLE), (np.append(z, close), BESIDE_ZERO)):
         for root in plane.touching(roots):
             away &= np.abs(omega - root.imag) > beside * omega
     difference = np.abs(_wrapped(angle - phi))[away]
     if not np.nan_to_num(difference).max(initial=0.0) < AGREES:
         return None
-    return _on_turn(angle, phi)
+    sides = [plane.swept(omega * shift, z) - plane.swept(omega * shift, p) - begin + rest for shift in BOTH_SIDES]
+    return _on_turn(angle, np.where(away, phi, _nearer(angle, *sides)))
+
+
+def _nearer(angle: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return of two phases, on both sides of a root on the axis, the one that an angle agrees with."""
+    return np.where(np.abs(_wrapped(angle - first)) <= np.abs(_wrapped(angle - second)), first, second)
 
 
 def _start(base: float, rest: float, *, is_real: bool) -> float:

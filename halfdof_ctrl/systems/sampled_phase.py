@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, IndexArray
 
 HALF_TURN = 1e-6  #: [rad] a jump of the phase this close to pi comes from an undamped pole or zero
 
@@ -44,8 +44,20 @@ def continuous_phase(values: ComplexArray) -> FloatArray:
     return phase
 
 
-def on_branch(values: ComplexArray, phase: FloatArray) -> FloatArray:
-    """Return the phase of values on the turn nearest to a given one."""
+def on_branch(values: ComplexArray, phase: FloatArray, places: IndexArray) -> FloatArray:
+    """Return the phase of values at some points of a curve, on the turn nearest to the curve there.
+
+    Parameters
+    ----------
+    values : (l,) complex ndarray
+    phase : (k,) ndarray
+        Phase of the curve [rad].
+    places : (l,) ndarray of int
+        Which points; at an undamped pole a value may be on either side of its half turn, so their neighbours count too.
+    """
     angle = np.where(values == 0.0, np.nan, np.angle(values))
-    turns = np.round((phase - angle) / (2.0 * np.pi))
-    return np.asarray(angle + 2.0 * np.pi * np.where(np.isnan(turns), 0.0, turns))
+    last = phase.size - 1
+    around = np.stack([phase[np.clip(places + step, 0, last)] for step in (0, -1, 1)])
+    turned = angle + 2.0 * np.pi * np.nan_to_num(np.round((around - angle) / (2.0 * np.pi)))
+    nearest = np.nan_to_num(np.abs(turned - around), nan=np.inf).argmin(axis=0)
+    return np.asarray(turned[nearest, np.arange(places.size)])

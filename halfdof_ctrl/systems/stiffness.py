@@ -273,8 +273,11 @@ def motion_frequencies(
             push = _units(rest, held).sum(axis=1, keepdims=True)
             poles.append(_seen(rest, functools.partial(_receptance, rest, push)))
     frequencies = default_frequencies(np.concatenate(poles))
-    if not linear:
-        return frequencies
+    return evenly_from_zero(frequencies) if linear else frequencies
+
+
+def evenly_from_zero(frequencies: FloatArray) -> FloatArray:
+    """Spread a default grid evenly from 0, up to four times the fastest mode, and keep what it has at peaks."""
     top = frequencies[-1] * LINEAR_MARGIN / MARGIN
     return np.unique(np.concatenate([np.linspace(0.0, top, DEFAULT_POINTS), frequencies[frequencies < top]]))
 

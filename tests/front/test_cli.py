@@ -166,7 +166,7 @@ def test_info_counts_free_motions(capsys: pytest.CaptureFixture[str]) -> None:
     """Two masses that nothing ties to the ground: one motion, two poles at 0."""
     save_model(mechss(np.eye(2), None, [[1, -1], [-1, 1]]), "free.npz")
     assert main(["info", "free.npz"]) == 0
-    assert "Free motions: 1, 2 poles at exactly 0" in capsys.readouterr().out
+    assert "1 free motion: 2 poles at exactly 0" in capsys.readouterr().out
 
 
 def test_info_says_why_a_model_has_no_state_space(capsys: pytest.CaptureFixture[str]) -> None:

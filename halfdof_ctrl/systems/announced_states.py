@@ -1,0 +1,64 @@
+"""The state space as users get it: with a word where it holds free motions as rounding.
+
+In DOF states the stiffness of a body that floats cancels in sums, not entry by entry: eigenvalue solvers find poles at
+1e-7 rad/s in the place of 0, also where A is singular to the last bit, and a static gain that is infinite comes out finite,
+of any sign.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import ParamSpec
+
+import control
+import numpy as np
+from scipy.linalg.lapack import dgetrf
+
+from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
+from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.model.free_motions import LARGEST, free_motion_count
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.systems import state_space
+
+P = ParamSpec("P")
+
+SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
+
+
+def _announcing(function: Callable[P, control.StateSpace]) -> Callable[P, control.StateSpace]:
+    """Warn of poles at the origin that a state space does not hold as such."""
+
+    @functools.wraps(function)
+    def announced(*args: P.args, **kwargs: P.kwargs) -> control.StateSpace:
+        system = function(*args, **kwargs)
+        given = args[0] if args else kwargs.get("model")
+        model = given.model if isinstance(given, ExactReduction) else given
+        if isinstance(model, SecondOrderModel) and kwargs.get("states", "dofs") in ("dofs", "scaled"):
+            _announce(model, np.asarray(system.A, dtype=float))
+        return system
+
+    return announced
+
+
+def _announce(model: SecondOrderModel, A: FloatArray) -> None:
+    if A.size == 0 or len(model.dofs) > LARGEST or not _may_be_singular(A):
+        return
+    free = free_motion_count(model.M, model.C, model.K)
+    if free is not None and np.count_nonzero(np.linalg.eigvals(A) == 0.0) < free.poles:
+        msg = (
+            f"The model has {free.in_words()}. In these states A holds the zeros as rounding, and python-control's poles "
+            "and static gain of it are finite. mech2ss(model, states='energy') keeps them; frequency_response(model) "
+            "and the plots know them."
+        )
+        give_warning(msg, LostDigitsWarning)
+
+
+def _may_be_singular(A: FloatArray) -> bool:
+    """Tell whether elimination meets a pivot that is zero or nearly so."""
+    factors, _, _ = dgetrf(balanced_states(A)[0])
+    pivots = np.abs(np.diagonal(factors))
+    return bool(pivots.min() <= SMALL_PIVOT * pivots.max())
+
+
+mech2ss = _announcing(state_space.mech2ss)
