@@ -1,8 +1,8 @@
 """The state space as users get it: with a word where it holds free motions as rounding.
 
 In DOF states the stiffness of a body that floats cancels in sums, not entry by entry: eigenvalue solvers find poles at
-1e-7 rad/s in the place of 0, also where A is singular to the last bit, and a static gain that is infinite comes out finite,
-of any sign.
+1e-8 of the other poles in the place of 0, also where A is singular to the last bit, and a static gain that is infinite
+comes out finite, of any sign. That is usual; where much more is lost it is said.
 """
 
 import functools
@@ -23,6 +23,7 @@ from halfdof_ctrl.systems import state_space
 
 P = ParamSpec("P")
 
+USUAL_SPURIOUS = 1e-6  #: of the slowest other pole: a double pole at 0 is moved by 1e-8 of it in any case
 SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
@@ -45,11 +46,15 @@ def _announce(model: SecondOrderModel, A: FloatArray) -> None:
     if A.size == 0 or len(model.dofs) > LARGEST or not _may_be_singular(A):
         return
     free = free_motion_count(model.M, model.C, model.K)
-    if free is not None and np.count_nonzero(np.linalg.eigvals(A) == 0.0) < free.poles:
+    if free is None:
+        return
+    size = np.sort(np.abs(np.linalg.eigvals(A)))
+    spurious, slowest = float(size[free.poles - 1]), float(size[min(free.poles, size.size - 1)])
+    if spurious > USUAL_SPURIOUS * slowest:
         msg = (
-            f"The model has {free.in_words()}. In these states A holds the zeros as rounding, and python-control's poles "
-            "and static gain of it are finite. mech2ss(model, states='energy') keeps them; frequency_response(model) "
-            "and the plots know them."
+            f"The model has {free.in_words()}. In these states rounding of A moves them to {spurious:.1e} rad/s, beside a "
+            f"slowest other pole of {slowest:.1e} rad/s, and the static gain of python-control is finite. "
+            "mech2ss(model, states='energy') keeps them at 0; frequency_response(model) and the plots know them."
         )
         give_warning(msg, LostDigitsWarning)
 

@@ -72,7 +72,8 @@ def mech2ss(
     states : {"dofs", "scaled", "energy", "modal"}, optional
         What the states are; `state_map` has the way to all DOFs and back for each.
 
-        - ``"dofs"``: displacements of inertial and half DOFs and velocities of inertial ones, in their units.
+        - ``"dofs"``: displacements of inertial and half DOFs and velocities of inertial ones, in their units. Motions
+          without stiffness are known to rounding only: poles at 1e-8 of the others instead of 0, a finite static gain.
         - ``"scaled"``: the same, each DOF measured in a power of two of its unit and time in one power of two, which
           python-control's evaluations need where stiffness ranges over many decades. The labels say which:
           ``y_dot/2^7`` is the velocity over 2^7.

@@ -26,6 +26,7 @@ FEW_MASSES = 400  #: DOFs with mass up to which all modes are found from the fle
 SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular ...
 SOFTER = (1e-12, 1e-10, 1e-8, 1e-6, 1e-3)  #: ... or is not told from singular with that one either
 UNSYMMETRIC = 1e-9  #: relative difference between a matrix and its transpose that is no rounding
+JUST_ABOVE = 1e-9  #: relative: where modes are counted if one lies at the very frequency
 MASSLESS_DIRECTION = 1e-13  #: of the largest eigenvalue of the mass at a few DOFs: directions below have none
 
 
@@ -95,8 +96,15 @@ def count_below(stiffness: ShiftedStiffness, omega: float) -> int:
     ``K - omega^2 M = L D L^T`` has as many negative entries in D as there are modes below (J. J. Sylvester, 1852).
     Elimination with pivots on the diagonal gives D without L having to be symmetric.
     """
-    shifted = csc_array(stiffness.K - omega**2 * stiffness.M)
-    factors = sparse_lu(shifted, *PIVOTINGS[0])
+    for nudge in (0.0, JUST_ABOVE):
+        shifted = csc_array(stiffness.K - (omega * (1.0 + nudge)) ** 2 * stiffness.M)
+        try:
+            factors = sparse_lu(shifted, *PIVOTINGS[0])
+        except RuntimeError:  # a mode to the last bit
+            if nudge:
+                raise
+        else:
+            break
     return int(np.count_nonzero(factors.U.diagonal() < 0.0))
 
 

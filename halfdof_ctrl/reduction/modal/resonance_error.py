@@ -8,7 +8,7 @@ one step of inverse iteration with the full matrices, and the Rayleigh quotient 
 whose root nearest to s_i is the full model's pole to twice the digits of w. The shift of frequency and of damping, and
 the change of the residue (F w)(w^T B) / (w^T (C + 2 s M) w), are the error where a value at a needle-sharp resonance
 says nothing: any shift at all is an error of many times the value there. Poles closer than one per cent are improved
-together, by a block and its Rayleigh-Ritz problem. Below u |w|^T |K| |w| / (w^T K w) a shift is not told from rounding.
+together, by a block and its Rayleigh-Ritz problem. Below 2 u |w|^T |K| |w| / (w^T K w) a shift is not told from rounding.
 """
 
 from dataclasses import dataclass
@@ -23,11 +23,14 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked: errors grow towards its end
+LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked in any case: errors grow towards its end ...
+CHECKED_SIZE = 2**26  #: ... and all others while DOFs times resonances are fewer
+FLOOR = 2.0  #: times rounding: of the entries of K, of the sums that they are, and of the energy (half of each to a frequency)
 POLES_TOGETHER = 0.01  #: relative distance of poles that are improved together
 LARGEST_GROUP = 12  #: poles that are improved together at most
 POLE_ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
 UNDAMPED_POLE = 1e-6  #: of its size: the real part of a pole that counts as undamped here
+MASS_SHIFT = 1e-3  #: of the squared end of the band: makes a stiffness regular that leaves motions free
 SILENT_RESONANCE = 1e-3  #: of a channel's largest residue over its pole's size: resonances below are no part of it
 OVERDAMPED = 0.7  #: damping ratio of what is no resonance
 
@@ -42,6 +45,7 @@ class ResonanceErrors:
     height: FloatArray  #: (k,) change of the residues, relative, in the channel where it is largest
     floor: FloatArray  #: (k,) relative shift of frequency that rounding of the full model's K may make
     poles: ComplexArray  #: (k,) of the small model [rad/s]
+    in_band: int  #: resonances that there are, the lowest and the highest of which were checked if k is smaller
 
 
 def resonance_errors(
@@ -65,9 +69,11 @@ def resonance_errors(
     ResonanceErrors
     """
     poles, vectors = _resonances(small, band)
+    in_band = poles.size
     chosen = np.arange(poles.size)
-    if poles.size > LOWEST + HIGHEST:
-        chosen = np.concatenate([chosen[:LOWEST], chosen[-HIGHEST:]])
+    most = max(LOWEST + HIGHEST, CHECKED_SIZE // basis.shape[0])
+    if poles.size > most:
+        chosen = np.concatenate([chosen[:LOWEST], chosen[LOWEST - most :]])
     poles, vectors = poles[chosen], vectors[:, chosen]
     found, shapes, floor = np.empty_like(poles), np.empty((basis.shape[0], poles.size), dtype=np.complex128), []
     for group in _groups(poles):
@@ -77,7 +83,7 @@ def resonance_errors(
         w = shapes[:, k]
         stiff: Any = parts["K"] @ w
         energy = abs(complex(w @ stiff))
-        floor.append(0.5 * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
+        floor.append(FLOOR * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
     return ResonanceErrors(
         frequencies=np.abs(poles) / (2.0 * np.pi),
         frequency_shift=np.abs(np.abs(found) - np.abs(poles)) / np.abs(found),
@@ -85,6 +91,7 @@ def resonance_errors(
         height=_height_errors(parts, small, (poles, vectors), (found, shapes)),
         floor=np.array(floor),
         poles=poles,
+        in_band=in_band,
     )
 
 
@@ -94,17 +101,45 @@ def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[Com
     size = np.abs(np.diagonal(small.K)) + scale**2 * np.abs(np.diagonal(small.M))
     units = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
     K, C, M = (np.asarray(part) * units * units[:, None] for part in (small.K, scale * small.C, scale**2 * small.M))
-    left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
-    right = scipy.linalg.block_diag(np.eye(n), M)
-    homogeneous, vectors = scipy.linalg.eig(left, right, homogeneous_eigvals=True)
-    alpha, beta = homogeneous
+    relative, vectors = _undamped_roots(K, M) if not (C.any() or np.iscomplexobj(K)) else _damped_roots(K, C, M)
     with np.errstate(divide="ignore", invalid="ignore"):
-        values = scale * np.asarray(alpha / beta, dtype=np.complex128)
+        values = scale * relative
         frequency = np.abs(values) / (2.0 * np.pi)
         swings = np.abs(values.real) < OVERDAMPED * np.abs(values)
     inside = np.flatnonzero((frequency >= band[0]) & (frequency <= band[1]) & (values.imag > 0.0) & swings)
     inside = inside[np.argsort(frequency[inside])]
-    return values[inside], units[:, None] * vectors[:n, inside]
+    return values[inside], units[:, None] * vectors[:, inside]
+
+
+def _undamped_roots(K: FloatArray, M: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return j omega and the modes of a semidefinite pair, in units in which the band ends at 1."""
+    parts, vectors = scipy.linalg.eigh((M + M.T) / 2.0, (K + K.T) / 2.0 + MASS_SHIFT * (M + M.T) / 2.0)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        squares = np.where(parts > 0.0, 1.0 / parts - MASS_SHIFT, np.inf)
+        values = 1j * np.sqrt(np.maximum(squares, 0.0))
+    return values, np.asarray(vectors, dtype=np.complex128)
+
+
+def _damped_roots(K: FloatArray, C: FloatArray, M: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return the roots of a quadratic problem and their vectors (n, 2 n), infinite ones among them."""
+    n = len(K)
+    try:
+        lower = np.linalg.cholesky((M + M.T) / 2.0)
+    except np.linalg.LinAlgError:  # DOFs without mass
+        left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
+        homogeneous, vectors = scipy.linalg.eig(
+            left, scipy.linalg.block_diag(np.eye(n), M), homogeneous_eigvals=True
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(homogeneous[0] / homogeneous[1], dtype=np.complex128), vectors[:n]
+    stiffness, damping = (
+        scipy.linalg.solve_triangular(
+            lower, scipy.linalg.solve_triangular(lower, part, lower=True).T, lower=True
+        ).T
+        for part in (K, C)
+    )
+    values, vectors = scipy.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))
+    return np.asarray(values, dtype=np.complex128), scipy.linalg.solve_triangular(lower.T, vectors[:n])
 
 
 def _groups(poles: ComplexArray) -> list[list[int]]:
@@ -127,7 +162,11 @@ def _improved(
     s = complex(poles.mean())
     if abs(s.real) < UNDAMPED_POLE * abs(s):
         s *= 1.0 + POLE_ASIDE * 1j
-    factors = sparse_lu(csc_array(K + s * C + s**2 * M))
+    try:
+        factors = sparse_lu(csc_array(K + s * C + s**2 * M))
+    except RuntimeError:  # a pole to the last bit
+        s *= 1.0 + POLE_ASIDE * 1j
+        factors = sparse_lu(csc_array(K + s * C + s**2 * M))
     right = C @ shapes + 2.0 * (M @ shapes) * poles
     w = factors.solve(np.asfortranarray(right, dtype=np.complex128))
     w = w / np.abs(w).max(axis=0)

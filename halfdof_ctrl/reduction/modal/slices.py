@@ -138,7 +138,10 @@ def _cut(K: SparseMatrix, M: SparseMatrix, ends: tuple[float, int, float, int]) 
 def _inertia(K: SparseMatrix, M: SparseMatrix, sigma: float) -> tuple[int, float]:
     """Count negative pivots of ``K - sigma M``, and how much its elimination without interchanges grows."""
     shifted = csc_array(K - sigma * M)
-    factors = sparse_lu(shifted, *PIVOTINGS[0])
+    try:
+        factors = sparse_lu(shifted, *PIVOTINGS[0])
+    except RuntimeError:  # a mode to the last bit
+        return 0, np.inf
     if (factors.perm_r != factors.perm_c).any():  # rows were interchanged, and pivots are no longer those of D
         return 0, np.inf
     growth = float(np.abs(factors.U.data).max(initial=0.0)) / (float(np.abs(shifted.data).max(initial=0.0)) or 1.0)
@@ -151,7 +154,11 @@ def _in_slice(
     """Find the modes of a slice; None where it does not give as many as it must hold."""
     n = K.shape[0]
     sigma = ends[0] + (0.5 + OFFSET) * (ends[1] - ends[0])
-    factors = sparse_lu(csc_array(K - sigma * M))
+    try:
+        factors = sparse_lu(csc_array(K - sigma * M))
+    except RuntimeError:  # a mode to the last bit
+        sigma += OFFSET * (ends[1] - ends[0])
+        factors = sparse_lu(csc_array(K - sigma * M))
     inverse = LinearOperator((n, n), matvec=factors.solve, dtype=np.float64)
     for attempt in range(1, TRIES + 1):
         k = min(count + SPARE * attempt, n - 1)

@@ -31,16 +31,19 @@ from halfdof_ctrl.base.errors import (
     give_warning,
 )
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import LETTERS, SecondOrderModel
 from halfdof_ctrl.model.singular import Cause, singular_pencil_error
+from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
 from halfdof_ctrl.reduction.modal.craig_bampton import KEPT_MODES_MARGIN, Motions, Parts, craig_bampton
 from halfdof_ctrl.reduction.modal.modes import is_unsymmetric
 from halfdof_ctrl.reduction.modal.projection import IMAGINARY_STIFFNESS, projected
 from halfdof_ctrl.reduction.modal.resonance_error import ResonanceErrors, resonance_errors
+from halfdof_ctrl.reduction.modal.zero_error import ZeroErrors, zero_errors
 
 MEASURED_POINTS = 12  #: frequencies between resonances at which the error is measured
 DOUBTFUL_POINTS = 4  #: frequencies where most is expected of it, at which it is measured too
@@ -68,7 +71,9 @@ class TruncatedModel(SecondOrderModel):
     band: tuple[float, float]  #: lowest and highest frequency at which the error was measured [Hz]
     checked: FloatArray  #: (l,) frequencies at which it was measured [Hz]
     errors: FloatArray  #: (p, m, l) of the transfer function there, relative to each channel's largest value there
+    data_limit: FloatArray  #: (p, m, l) what rounding of the full model's entries makes of it, (DATA), likewise
     resonances: ResonanceErrors  #: how far resonances in the band are from those of the full model
+    antiresonances: ZeroErrors  #: the same of antiresonances
 
     @property
     def max_error(self) -> float:
@@ -114,7 +119,7 @@ def truncate_modes(
         Number of modes to keep, in the place of `f_max`; the band then reaches to half the highest of them.
     points : int
         Frequencies between resonances at which the full model is factorized to measure the error; up to four where most
-        is expected of the error, and up to 40 resonances, come on top.
+        is expected of the error, the resonances of the band, and up to 48 antiresonances come on top.
 
     Returns
     -------
@@ -138,7 +143,8 @@ def truncate_modes(
     -----
     TruncationWarning
         The error is above 5 per cent of a channel's largest value between resonances or of a resonance's height, or a
-        resonance is shifted by more than 1 per cent.
+        resonance is shifted by more than 1 per cent; the message says where rounding of the full model's
+        entries alone makes so much.
 
     Notes
     -----
@@ -249,10 +255,14 @@ def _measured(
     wanted = np.union1d(np.geomspace(*band, points), _doubtful(small, motions, *band))
     frequencies = _beside(wanted, resonances.poles, band)
     s = 2j * np.pi * frequencies
-    found, desired = small(s, squeeze=False), model(s, squeeze=False)
+    full = SparseTransfer(*[tuple(map(as_sparse, part)) for part in model.quadratics])
+    found, desired, limit = small(s, squeeze=False), np.empty((*model.D.shape, s.size), complex), []
+    for k, point in enumerate(progress(s.tolist(), "frequencies")):
+        desired[:, :, k] = full.at(point)
+        limit.append(full.limit.data)
     sound = np.isfinite(found) & np.isfinite(desired)
     difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
-    errors = _relative(difference, size)
+    errors, data = (_relative(part, size) for part in (difference, np.where(sound, np.stack(limit, axis=2), 0.0)))
     fields = {letter: getattr(small, letter) for letter in LETTERS}
     truncated = TruncatedModel(
         **fields,
@@ -267,11 +277,22 @@ def _measured(
         band=band,
         checked=read_only(frequencies),
         errors=read_only(errors),
+        data_limit=read_only(data),
         resonances=resonances,
+        antiresonances=zero_errors(full, small, resonances.poles, band),
     )
-    shift, height = truncated.max_shift, float(resonances.height.max(initial=0.0))
-    if truncated.max_error > ALLOWED_ERROR or shift > ALLOWED_SHIFT or height > ALLOWED_ERROR:
-        said = " ".join(_error_in_words(truncated).split())
+    told = resonances.frequency_shift > resonances.floor
+    height = float(resonances.height[told].max(initial=0.0))
+    said = " ".join(_error_in_words(truncated).split())
+    undetermined = max(float(data.max(initial=0.0)) / ALLOWED_ERROR, float(resonances.floor.max(initial=0.0)) / ALLOWED_SHIFT)
+    large = truncated.max_error > ALLOWED_ERROR or truncated.max_shift > ALLOWED_SHIFT or height > ALLOWED_ERROR
+    if large and undetermined > 1.0:
+        msg = (
+            f"The small model is as far from the full one as rounding of the entries of M, C, K, known to their last "
+            f"digit, moves that itself: {said}. More modes do not help; fewer elements do."
+        )
+        give_warning(msg, TruncationWarning)
+    elif large:
         msg = f"The small model is not close to the full one: {said}. Raise f_max or n_modes."
         give_warning(msg, TruncationWarning)
     return truncated
@@ -304,14 +325,24 @@ def _error_in_words(small: TruncatedModel) -> str:
         shift = f"{found.frequency_shift[worst]:.1e} (at {found.frequencies[worst]:.4g} Hz)"
         if found.frequency_shift[worst] <= found.floor[worst]:
             shift += ", not told from rounding"
+        checked = "" if found.in_band == found.frequencies.size else f" of {found.in_band}"
         lines = (
-            f"  {found.frequencies.size} resonances from {found.frequencies[0]:.4g} to {found.frequencies[-1]:.4g} Hz: "
+            f"  {found.frequencies.size}{checked} resonances from {found.frequencies[0]:.4g} to {found.frequencies[-1]:.4g} Hz: "
             f"frequency within {shift}, damping within {found.damping_shift.max():.1e}, height within "
             f"{found.height.max():.1e}\n"
         )
+    zeros = small.antiresonances
+    if (place := zeros.worst) is not None:
+        doubt = "" if zeros.shift[place] > zeros.floor[place] else ", not told from rounding"
+        lines += (
+            f"  {zeros.shift.size} antiresonances: frequency within {zeros.shift[place]:.1e} (at "
+            f"{zeros.frequencies[place]:.4g} Hz){doubt}\n"
+        )
+    rounding = float(small.data_limit[i, j, k])
+    allowed = f", of which rounding of the entries may make {rounding:.1e}" if rounding > small.max_error / 10.0 else ""
     return (
         f"{lines}  error between them from {small.band[0]:.4g} to {small.band[1]:.4g} Hz, at {small.checked.size} "
-        f"frequencies: {small.max_error:.1e} of the channel's largest value there\n"
+        f"frequencies: {small.max_error:.1e} of the channel's largest value there{allowed}\n"
         f"  worst: {small.outputs[i]} from {small.inputs[j]} at {small.checked[k]:.4g} Hz"
     )
 
