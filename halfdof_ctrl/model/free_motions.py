@@ -48,9 +48,7 @@ class FreeMotionCount:
         )
 
 
-def free_motion_count(
-    M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, rounding: float = EPS
-) -> FreeMotionCount | None:
+def free_motion_count(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, rounding: float = EPS) -> FreeMotionCount | None:
     """Count the motions that a symmetric stiffness leaves free.
 
     Parameters
@@ -73,34 +71,51 @@ def free_motion_count(
     >>> free_motion_count(np.eye(2), np.diag([1.0, 0.0]), K).poles, free_motion_count(np.eye(2), 0.0 * K, K).poles
     (1, 2)
     """
-    if any([is_complex(part) for part in (M, C, K)]):  # noqa: C419  # a list is faster here
+    parts = _symmetric_parts(M, C, K)
+    if parts is None:
         return None
-    stiffness, damping = as_dense(K), as_dense(C)
-    if not (np.array_equal(stiffness, stiffness.T) and np.array_equal(damping, damping.T)):
-        return None
+    mass, damping, stiffness = parts
     size = np.diagonal(stiffness)
-    if (size < 0.0).any() or stiffness[size == 0.0].any():
-        return None
     scale = np.where(size > 0.0, powers_of_two(np.sqrt(np.abs(size))), 1.0)
     scaled = scale[:, None] * stiffness * scale
     if not _has_soft_motions(scaled, max(SMALL, rounding)):
         return None
     values, vectors = np.linalg.eigh(scaled)
-    largest = max(float(values[-1]), 0.0)
-    few = int(np.count_nonzero(values <= max(SMALL, rounding) * largest))
-    if few == 0 or values[0] < -len(scaled) * rounding * largest:
-        return None
-    ratios = _ratios(scaled, vectors[:, : few + BESIDE])
-    free = np.flatnonzero(np.abs(ratios) <= rounding)
-    others = np.delete(ratios, free)
-    if free.size == 0 or (others <= NEXT_MOTION * max(float(np.abs(ratios[free]).max()), EPS)).any():
+    free = _free(scaled, values, vectors, rounding)
+    if free.size == 0:
         return None
     motions = _improved(scaled, values, vectors, free)
     motions = scale[:, None] * motions
     resisted = _resisted(damping, motions, rounding)
-    if _resisted(as_dense(M) + damping, motions, rounding) < free.size:
+    if _resisted(mass + damping, motions, rounding) < free.size:
         return None
     return FreeMotionCount(free.size, 2 * free.size - resisted, rounding)
+
+
+def _symmetric_parts(
+    M: ModelMatrix, C: ModelMatrix, K: ModelMatrix
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Return dense matrices; None where one is complex or unsymmetric, or K negative at a glance."""
+    if any([is_complex(part) for part in (M, C, K)]):  # noqa: C419  # a list is faster here
+        return None
+    mass, damping, stiffness = as_dense(M), as_dense(C), as_dense(K)
+    size = np.diagonal(stiffness)
+    symmetric = np.array_equal(stiffness, stiffness.T) and np.array_equal(damping, damping.T)
+    if not symmetric or (size < 0.0).any() or stiffness[size == 0.0].any():
+        return None
+    return mass, damping, stiffness
+
+
+def _free(K: FloatArray, values: FloatArray, vectors: FloatArray, rounding: float) -> IndexArray:
+    """Return which of the eigenvectors are free motions; none where that is not told from soft ones."""
+    largest = max(float(values[-1]), 0.0)
+    few = int(np.count_nonzero(values <= max(SMALL, rounding) * largest))
+    ratios = _ratios(K, vectors[:, : few + BESIDE])
+    free = np.flatnonzero(np.abs(ratios) <= rounding)
+    others = np.delete(ratios, free)
+    next_one = NEXT_MOTION * max(float(np.abs(ratios[free]).max(initial=0.0)), EPS)
+    sound = values[0] >= -len(K) * rounding * largest and not (others <= next_one).any()
+    return free if sound else free[:0]
 
 
 def _has_soft_motions(K: FloatArray, part: float) -> bool:

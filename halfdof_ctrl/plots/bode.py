@@ -259,7 +259,7 @@ def dress_bode(
 
 
 def _set_logarithmic(ax: Axes) -> None:
-    """Make the magnitude's axis logarithmic; undamped resonances and antiresonances leave it and do not flatten the rest."""
+    """Make the magnitude's axis logarithmic; undamped peaks and notches leave it and do not flatten the rest."""
     curve = np.concatenate([np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     curve = curve[np.isfinite(curve) & (curve > 0.0)]
     if curve.size == 0:

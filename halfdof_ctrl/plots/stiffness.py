@@ -47,7 +47,9 @@ ANGLE_STEPS = {
 WIDE_ANGLES = 60.0  #: [deg] range of angles with ticks at parts of a right angle
 STIFFNESS_SPIKE = {"linear": 10.0, "log": 1e5}  #: a peak higher than this times that range is cut
 ROOM_ABOVE = {"linear": 2.0, "log": 300.0}  #: and the axis ends at this times that range
-WIDE_RANGE = 1e4  #: ratio of the ends of a default grid, each a factor of 10 off the modes, from which it is logarithmic
+WIDE_RANGE = (
+    1e4  #: ratio of the ends of a default grid, each a factor of 10 off the modes, from which it is logarithmic
+)
 CONSTANT_SPAN = 1e-6  #: [deg] or part of the magnitude: a smaller range is constant
 
 

@@ -52,8 +52,8 @@ def _announce(model: SecondOrderModel, A: FloatArray) -> None:
     spurious, slowest = float(size[free.poles - 1]), float(size[min(free.poles, size.size - 1)])
     if spurious > USUAL_SPURIOUS * slowest:
         msg = (
-            f"The model has {free.in_words()}. In these states rounding of A moves them to {spurious:.1e} rad/s, beside a "
-            f"slowest other pole of {slowest:.1e} rad/s, and the static gain of python-control is finite. "
+            f"The model has {free.in_words()}. In these states rounding of A moves them to {spurious:.1e} rad/s, "
+            f"beside a slowest other pole of {slowest:.1e} rad/s, and the static gain of python-control is finite. "
             "mech2ss(model, states='energy') keeps them at 0; frequency_response(model) and the plots know them."
         )
         give_warning(msg, LostDigitsWarning)

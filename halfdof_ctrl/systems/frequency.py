@@ -267,7 +267,9 @@ def _lowest_frequencies(model: SecondOrderModel) -> FloatArray:
     if not (model.is_complex or is_unsymmetric(K) or is_unsymmetric(M)):
         with limited_threads(1):
             stiffness = ShiftedStiffness.factorized(K, M)
-            for count in (GRID_MODES, MORE_MODES) if stiffness is not None else ():
+            for count in (GRID_MODES, MORE_MODES):
+                if stiffness is None:
+                    break
                 modes = lowest_modes(stiffness, count)
                 seen = modes.omega[_shown_modes(model, modes)]
                 moving = np.asarray(seen[seen > POLE_AT_ORIGIN * modes.omega.max(initial=0.0)])[:GRID_MODES]
@@ -302,7 +304,7 @@ def _shown_modes(model: SecondOrderModel, modes: Modes) -> npt.NDArray[np.bool_]
 
 
 def system_frequencies(sys: control.StateSpace, model: SecondOrderModel | None = None) -> FloatArray:
-    """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt and up to the Nyquist frequency, nearly."""
+    """Choose frequencies for a state space; of a discrete one, by s = log(z) / dt, nearly to its Nyquist frequency."""
     if not sys.isdtime(strict=True):
         return _grid(*system_modes(sys, model=model))
     dt = float(sys.dt)

@@ -4,13 +4,13 @@
     th(w - r) = atan2(w - b, |a|)  for a root r = a + jb on or left of the axis, its negative right of it
 
 and likewise along the unit circle for discrete systems (`phase_sources`). A root on the axis counts as the limit of
-vanishing damping: a pole lowers the phase by 180 deg, a zero raises it. At w = 0 the phase is 90 deg for each zero at the
-origin, less 90 deg for each pole there, and 180 deg beside that where the gain is negative, on the side nearer to 0.
+vanishing damping: a pole lowers the phase by 180 deg, a zero raises it. At w = 0 the phase is 90 deg for each zero at
+the origin, less 90 deg for each pole there, and 180 deg beside that if the gain is negative, on the side nearer to 0.
 What is shown is the angle of the value itself, on the turn nearest to phi, so that any grid gives the same branch.
 Where phi and the values disagree the zeros are wrong, and where there are too many of them none are computed; then the
 phase is followed along half circles in the right half plane, over each interval of the grid, where a response without
-roots there is smooth. At a DOF that is driven and observed it is known without either: work is done on the structure, so
-that a receptance stays between 0 and -180 deg.
+roots there is smooth. At a DOF that is driven and observed it is known without either: work is done on the structure,
+so that a receptance stays between 0 and -180 deg.
 """
 
 import control

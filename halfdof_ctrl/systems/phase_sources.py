@@ -3,8 +3,9 @@
 The phase of a response along the boundary of stability, s = j w or z = exp(j w dt), is a sum over roots r of the
 angle of (point - r). Each is split into a constant and a part that is continuous in w,
 
-    s-plane:  th(w - r) = atan2(w - b, |a|), r = a + jb, its negative right of the axis;       constant 0, or pi on the right
-    z-plane:  w dt + arg(1 - r exp(-j w dt)) inside the circle, arg(1 - exp(j w dt) / r) outside;     0, or arg(-r) outside
+    s-plane, r = a + jb:   atan2(w - b, |a|), its negative right of the axis,   constant 0, or pi right of the axis
+    z-plane, in the circle:   w dt + arg(1 - r exp(-j w dt)),   constant 0
+    z-plane, outside:   arg(1 - exp(j w dt) / r),   constant arg(-r)
 
 A root on the boundary counts as the limit of vanishing damping.
 """

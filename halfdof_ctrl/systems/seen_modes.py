@@ -175,9 +175,7 @@ def seen_by_vectors(A: FloatArray, B: FloatArray, C: FloatArray, D: FloatArray, 
             shown = ~np.isfinite(whole) | ~np.isfinite(own) | (np.abs(own) > VISIBLE * np.abs(whole - own))
         frequency[cluster.places] = bool((shown & (own != 0.0)).any())
     step |= _in_step(np.nan_to_num(steps), np.abs(D), clusters, poles.values.size)
-    return SeenModes(
-        poles.values, poles.bounds, _mirrored(poles.values, frequency), _mirrored(poles.values, step)
-    )
+    return SeenModes(poles.values, poles.bounds, _mirrored(poles.values, frequency), _mirrored(poles.values, step))
 
 
 def _clusters(values: ComplexArray, bounds: FloatArray, *, real: bool) -> list[_Cluster]:

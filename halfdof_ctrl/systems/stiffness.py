@@ -17,10 +17,11 @@ import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
+from halfdof_ctrl.base.sparse_arrays import locked
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.doors import checked_model
@@ -228,9 +229,7 @@ def _transmissibility_source(
     if kind == "motion":
         return source_of(rest.prescribe_motion(from_, outputs=list(to)))
     moved = rest.prescribe_motion(to, inputs=list(force_names(from_)), outputs=list(reaction_names(to)))
-    signs: dict[str, Any] = {
-        letter: read_only(-np.asarray(getattr(moved, letter))) for letter in ("F", "G", "H", "D", "Dv", "Da")
-    }
+    signs: dict[str, Any] = {letter: locked(-getattr(moved, letter)) for letter in ("F", "G", "H", "D", "Dv", "Da")}
     return source_of(replace(moved, **signs))  # what arrives at the support is minus its reaction
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import (
     SecondOrderModel,
@@ -118,3 +119,62 @@ def test_a_negative_gain_starts_at_minus_180() -> None:
     lag = control.ss([[-1.0]], [[1.0]], [[-2.0]], [[0.0]])
     assert_allclose(degrees(frequency_response(lag, [1e-3]))[0], -180.0, atol=0.1)
     assert_allclose(degrees(frequency_response(mechss([[1.0]], None, None), [1e-3, 1.0])), -180.0, atol=DEGREES)
+
+
+@given(st.lists(st.floats(0.01, 100.0), min_size=1, max_size=6, unique=True), st.integers(0, 5))
+def test_undamped_receptances_keep_their_side_however_they_are_given(omega: list[float], place: int) -> None:
+    """As state space in DOF and energy states, as sparse model, and where one frequency is a resonance exactly."""
+    model = chain(6).select(f"F_q{place}", f"q{place}")
+    resonance = 2.0 * np.sin(np.pi * 3.0 / 14.0)
+    points = np.unique([*omega, resonance])
+    sparse = mechss(csc_array(model.M), csc_array(model.C), csc_array(model.K)).select(f"F_q{place}", f"q{place}")
+    for one in (model, sparse, mech2ss(model), mech2ss(model, states="energy")):
+        found = degrees(frequency_response(one, points))
+        known = np.isfinite(found)
+        assert (np.abs(found[known] + 90.0) <= 90.0 + DEGREES).all()
+
+
+@pytest.mark.parametrize("loss", [1e-4, 0.05, 0.5])
+def test_structural_damping_keeps_a_receptance_between_0_and_minus_180(loss: float) -> None:
+    """Complex stiffness, poles and zeros right of the axis among them; from five points and from five hundred."""
+    model = chain(4)
+    model = mechss(model.M, None, np.asarray(model.K) * (1.0 + 1j * loss))
+    few = np.array([0.02, 0.7, 1.3, 1.8, 30.0])
+    many = np.unique([*few, *np.geomspace(0.01, 100.0, 500)])
+    for output in ("q0", "q3"):
+        fine = degrees(frequency_response(model.select("F_q0", output), many))
+        coarse = degrees(frequency_response(model.select("F_q0", output), few))
+        assert_allclose(coarse, fine[np.searchsorted(many, few)], atol=DEGREES)
+        assert_allclose(fine[0], -np.degrees(np.arctan(loss)), rtol=0.05)
+    driven = degrees(frequency_response(model.select("F_q0", "q0"), many))
+    assert (np.abs(driven + 90.0) <= 90.0 + DEGREES).all()
+    assert_allclose(fine[-1], -720.0 + 3.0 * np.degrees(np.arctan(loss)), atol=1.0)  # k^3 (1 + j loss)^3 / (m w^2)^4
+
+
+@given(step=st.floats(0.02, 0.9), damping=st.sampled_from([0.0, 0.05]), seed=st.integers(0, 2**32 - 1))
+def test_sampled_systems_have_one_phase_on_any_grid(step: float, damping: float, seed: int) -> None:
+    """A chain sampled by a zero-order hold: five frequencies of the default grid, alone and among all."""
+    generator = np.random.default_rng(seed)
+    sampled = control.sample_system(mech2ss(chain(3, damping).select("F_q0", "q0")), step, "zoh")
+    grid = np.asarray(frequency_response(sampled).omega)
+    few = np.sort(generator.choice(grid, 5, replace=False))
+    fine, coarse = degrees(frequency_response(sampled, grid)), degrees(frequency_response(sampled, few))
+    assert_allclose(coarse, fine[np.searchsorted(grid, few)], atol=1e-3)
+    assert_allclose(fine[0], 0.0, atol=3.0)
+
+
+def test_integrators_start_at_minus_90_in_the_z_plane() -> None:
+    """A sampled integrator and a sampled free mass: -90 and -180 degrees at low frequency."""
+    for model, start in ((mechss([[0.0]], [[1.0]], [[0.0]]), -90.0), (mechss([[1.0]], None, None), -180.0)):
+        sampled = control.sample_system(mech2ss(model), 0.1, "zoh")
+        assert_allclose(degrees(frequency_response(sampled, [1e-3, 1.0]))[0], start, atol=0.1)
+
+
+def test_work_tells_the_phase_where_nothing_else_does(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without roots and half circles: displacement, velocity and acceleration at the force, from three points each."""
+    monkeypatch.setattr(phase, "ZERO_EFFORT", 0.0)
+    monkeypatch.setattr(phase, "CIRCLE_EFFORT", 0.0)
+    model = chain(4, 1e-3)
+    for output, middle in (("q1", -90.0), ("q1_dot", 0.0), ("q1_ddot", 90.0)):
+        found = degrees(frequency_response(model.select("F_q1", output), [0.3, 1.0, 5.0]))
+        assert (np.abs(found - middle) <= 90.0 + DEGREES).all()

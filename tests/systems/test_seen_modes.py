@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.sparse import csc_array, eye_array
 
 from halfdof_ctrl import (
     SecondOrderModel,
@@ -17,8 +18,9 @@ from halfdof_ctrl import (
     transmissibility_response,
 )
 from halfdof_ctrl.systems.default_grid import MOST_POINTS, default_frequencies
+from halfdof_ctrl.systems.frequency import model_frequencies
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
-from halfdof_ctrl.systems.seen_modes import seen_modes
+from halfdof_ctrl.systems.seen_modes import seen_by_vectors, seen_modes
 
 RESONANCE = 16.569  # [rad/s] of the mount without its damper C_rs, to the digits that do not depend on it
 WEAK = [1e-12, 1e-8, 1e-4]
@@ -96,3 +98,53 @@ def test_grids_are_small_and_meet_every_peak(roots: list[tuple[float, float]]) -
     assert (np.diff(grid) > 0.0).all()
     for pole in poles[np.abs(poles.real) < 0.05 * poles.imag]:
         assert np.abs(grid - pole.imag).min() == 0.0
+
+
+def chain_with_weak_damper(masses: int) -> SecondOrderModel:
+    """Give a held chain of masses of 1 kg on springs of 1 N/m, with a node without mass on a damper of 1e-9 N s/m."""
+    K = np.zeros((masses + 1, masses + 1))
+    K[:-1, :-1] = 2.0 * np.eye(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
+    K[3, 3] += 1.0
+    K[-1, -1], K[3, -1], K[-1, 3] = 1.0, -1.0, -1.0
+    C = np.zeros_like(K)
+    C[-1, -1] = 1e-9
+    return mechss(np.diag([1.0] * masses + [0.0]), C, K).select("F_q0", "q0")
+
+
+@pytest.mark.parametrize("masses", [20, 110])
+def test_a_fast_pole_does_not_stretch_the_grid_of_a_long_chain(masses: int) -> None:
+    """A pole at -1e9 rad/s beside modes up to 2 rad/s, few states and many: the grid ends ten times above these."""
+    model = chain_with_weak_damper(masses)
+    omega = np.asarray(frequency_response(model, None).omega)
+    assert omega[-1] == pytest.approx(20.0, rel=0.2)
+    assert omega.size <= MOST_POINTS
+    assert np.abs(omega - 2.0 * np.sin(np.pi / (2.0 * masses + 2.0))).min() < 1e-3 * omega[0] * 10.0
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_eigenvectors_see_nearly_what_circles_see(seed: int) -> None:
+    """Two ways to the residues of poles that are far apart; the half that is not reached is in neither."""
+    generator = np.random.default_rng(seed)
+    size = generator.uniform(0.0, 4.0, 6)
+    A = np.kron(np.diag(10.0**size), np.array([[-0.05, 1.0], [-1.0, -0.05]]))
+    B, C = np.zeros((12, 1)), np.zeros((1, 12))
+    B[:6:2], C[0, 1::2] = 1.0, 1.0
+    poles = bounded_poles(A)
+    first, second = seen_modes(A, B, C, np.zeros((1, 1)), poles), seen_by_vectors(A, B, C, np.zeros((1, 1)), poles)
+    reached = np.abs(np.abs(poles.values)[:, None] - np.abs(np.linalg.eigvals(A[:6, :6]))).min(axis=1) < 1e-6
+    assert not second.in_frequency[~reached].any()
+    assert first.in_frequency.tolist() == second.in_frequency.tolist()
+
+
+def test_large_sparse_models_choose_by_what_their_channels_show() -> None:
+    """The middle of a held chain of 1101 masses stands still in every second mode: points are at the others."""
+    n = 1101
+    K = csc_array(2.0 * eye_array(n) - eye_array(n, k=1) - eye_array(n, k=-1))
+    middle = f"q{n // 2}"
+    omega = model_frequencies(mechss(csc_array(eye_array(n)), csc_array(1e-3 * K), K).select(f"F_{middle}", middle))
+    modes = 2.0 * np.sin(np.pi * np.arange(1, 26) / (2.0 * n + 2.0))
+    assert omega.size <= 200
+    assert omega[-1] > modes[10]
+    near = np.abs(omega[:, None] / modes - 1.0).min(axis=0)
+    assert (near[0:11:2] < 2e-4).all()
+    assert (near[1:11:2] > 2e-4).any()

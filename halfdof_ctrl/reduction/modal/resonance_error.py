@@ -8,7 +8,8 @@ one step of inverse iteration with the full matrices, and the Rayleigh quotient 
 whose root nearest to s_i is the full model's pole to twice the digits of w. The shift of frequency and of damping, and
 the change of the residue (F w)(w^T B) / (w^T (C + 2 s M) w), are the error where a value at a needle-sharp resonance
 says nothing: any shift at all is an error of many times the value there. Poles closer than one per cent are improved
-together, by a block and its Rayleigh-Ritz problem. Below 2 u |w|^T |K| |w| / (w^T K w) a shift is not told from rounding.
+together, by a block and its Rayleigh-Ritz problem. Below 2 u |w|^T |K| |w| / (w^T K w) a shift is not told from
+rounding.
 """
 
 from dataclasses import dataclass
@@ -25,7 +26,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked in any case: errors grow towards its end ...
 CHECKED_SIZE = 2**26  #: ... and all others while DOFs times resonances are fewer
-FLOOR = 2.0  #: times rounding: of the entries of K, of the sums that they are, and of the energy (half of each to a frequency)
+FLOOR = 2.0  #: times u: half of what rounds the entries of K, the sums that they are, and the energy
 POLES_TOGETHER = 0.01  #: relative distance of poles that are improved together
 LARGEST_GROUP = 12  #: poles that are improved together at most
 POLE_ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
@@ -97,7 +98,7 @@ def resonance_errors(
 
 def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[ComplexArray, ComplexArray]:
     """Return the poles of the small model with frequencies in the band, and their vectors (r, k)."""
-    n, scale = len(small.dofs), 2.0 * np.pi * band[1]
+    scale = 2.0 * np.pi * band[1]
     size = np.abs(np.diagonal(small.K)) + scale**2 * np.abs(np.diagonal(small.M))
     units = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
     K, C, M = (np.asarray(part) * units * units[:, None] for part in (small.K, scale * small.C, scale**2 * small.M))
@@ -127,15 +128,11 @@ def _damped_roots(K: FloatArray, C: FloatArray, M: FloatArray) -> tuple[ComplexA
         lower = np.linalg.cholesky((M + M.T) / 2.0)
     except np.linalg.LinAlgError:  # DOFs without mass
         left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
-        homogeneous, vectors = scipy.linalg.eig(
-            left, scipy.linalg.block_diag(np.eye(n), M), homogeneous_eigvals=True
-        )
+        homogeneous, vectors = scipy.linalg.eig(left, scipy.linalg.block_diag(np.eye(n), M), homogeneous_eigvals=True)
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(homogeneous[0] / homogeneous[1], dtype=np.complex128), vectors[:n]
     stiffness, damping = (
-        scipy.linalg.solve_triangular(
-            lower, scipy.linalg.solve_triangular(lower, part, lower=True).T, lower=True
-        ).T
+        scipy.linalg.solve_triangular(lower, scipy.linalg.solve_triangular(lower, part, lower=True).T, lower=True).T
         for part in (K, C)
     )
     values, vectors = scipy.linalg.eig(np.block([[np.zeros((n, n)), np.eye(n)], [-stiffness, -damping]]))

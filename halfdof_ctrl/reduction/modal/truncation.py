@@ -284,7 +284,9 @@ def _measured(
     told = resonances.frequency_shift > resonances.floor
     height = float(resonances.height[told].max(initial=0.0))
     said = " ".join(_error_in_words(truncated).split())
-    undetermined = max(float(data.max(initial=0.0)) / ALLOWED_ERROR, float(resonances.floor.max(initial=0.0)) / ALLOWED_SHIFT)
+    undetermined = max(
+        float(data.max(initial=0.0)) / ALLOWED_ERROR, float(resonances.floor.max(initial=0.0)) / ALLOWED_SHIFT
+    )
     large = truncated.max_error > ALLOWED_ERROR or truncated.max_shift > ALLOWED_SHIFT or height > ALLOWED_ERROR
     if large and undetermined > 1.0:
         msg = (
@@ -327,7 +329,8 @@ def _error_in_words(small: TruncatedModel) -> str:
             shift += ", not told from rounding"
         checked = "" if found.in_band == found.frequencies.size else f" of {found.in_band}"
         lines = (
-            f"  {found.frequencies.size}{checked} resonances from {found.frequencies[0]:.4g} to {found.frequencies[-1]:.4g} Hz: "
+            f"  {found.frequencies.size}{checked} resonances from {found.frequencies[0]:.4g} to "
+            f"{found.frequencies[-1]:.4g} Hz: "
             f"frequency within {shift}, damping within {found.damping_shift.max():.1e}, height within "
             f"{found.height.max():.1e}\n"
         )

@@ -88,7 +88,7 @@ def _notches(channel: SecondOrderModel, band: tuple[float, float]) -> ComplexArr
         np.block([[P, -B], [F, D]]) * scale**power
         for power, (P, B, F, D) in enumerate(zip(*channel.quadratics, strict=True))
     ]
-    size = sum(np.abs(part) for part in parts)
+    size = np.abs(parts[0]) + np.abs(parts[1]) + np.abs(parts[2])
     for _ in range(3):  # rows and columns of one size
         size = size / np.where((rows := size.max(axis=1)) > 0.0, rows, 1.0)[:, None]
         parts = [part / np.where(rows > 0.0, rows, 1.0)[:, None] for part in parts]

@@ -9,7 +9,7 @@ import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy.sparse import csc_array, diags_array
+from scipy.sparse import coo_array, csc_array, diags_array
 
 from halfdof_ctrl import (
     SecondOrderModel,
@@ -31,6 +31,7 @@ from halfdof_ctrl.base.errors import (
     TruncationWarning,
 )
 from halfdof_ctrl.reduction.modal import craig_bampton, truncation
+from support.beams import beam_matrices
 from support.fe_models import space_frame, spring_grid
 
 AT_REST = 1e-9  # the small model is exact at s = 0, up to the condition of K
@@ -321,3 +322,45 @@ def test_names_of_coordinates_keep_clear_of_dofs() -> None:
     dofs = ["mode1", *[f"x{k}" for k in range(n - 1)]]
     small = truncate_modes(mechss(csc_array(np.eye(n)), None, csc_array(K), dofs=dofs).select("F_x3", "x3"), n_modes=2)
     assert small.dofs == ("x3", "mode_1", "mode_2", "correction1")
+
+
+def test_the_shift_of_antiresonances_is_told() -> None:
+    """Notches of a cantilever at its own force are the modes with that DOF held: two digits are right."""
+    M, K = beam_matrices(60)
+    tip = 118
+    small = truncate_modes(mechss(M, None, K).select(f"F_q{tip}", f"q{tip}"), f_max=60.0)
+    held = np.delete(np.arange(len(K)), tip)
+    full = np.sqrt(scipy.linalg.eigvalsh(K[np.ix_(held, held)], M[np.ix_(held, held)])) / (2.0 * np.pi)
+    found = small.antiresonances
+    shift = np.abs(found.frequencies[:, None] / full - 1.0).min(axis=1)
+    told = found.shift > 100.0 * np.maximum(found.floor, 1e-11)
+    assert found.shift.size >= 4
+    assert told.any()
+    assert_allclose(found.shift[told], shift[told], rtol=0.05)
+    assert f"{found.shift.size} antiresonances: frequency within" in repr(small)
+
+
+def test_a_clamped_beam_that_rounding_undoes_is_not_refused() -> None:
+    """6000 elements: rounding of the entries moves the first mode by per cents, and more modes would not help."""
+    model = long_cantilever(6000)
+    with pytest.warns(TruncationWarning, match=r"known to their last digit.*More modes do not help; fewer elements do"):
+        small = truncate_modes(model, f_max=5.0, points=3)
+    assert small.resonances.floor[0] > 0.01
+
+
+def long_cantilever(elements: int) -> SecondOrderModel:
+    """Give the sparse matrices of a unit cantilever, force and displacement at its tip."""
+    M, K = beam_matrices(2, clamped=False)
+    scale = np.tile([1.0, 2.0 / elements], 2)  # rotations by the length of an element
+    parts = []
+    for whole, factor in ((M, 2.0 / elements), (K, (elements / 2.0) ** 3)):
+        first = whole[:4, :4].copy()
+        first[2:, 2:] = whole[4:, 4:]
+        block = first * scale[:, None] * scale * factor
+        places = 2 * np.arange(elements)[:, None] + np.arange(4)
+        rows, columns = np.repeat(places, 4, axis=1).ravel(), np.tile(places, (1, 4)).ravel()
+        size = 2 * elements + 2
+        entries = np.tile(block.ravel(), elements), (rows, columns)
+        parts.append(csc_array(csc_array(coo_array(entries, shape=(size, size)))[2:][:, 2:]))
+    tip = f"q{2 * elements - 2}"
+    return mechss(parts[0], None, parts[1]).select(f"F_{tip}", tip)
