@@ -1,5 +1,7 @@
 """State spaces that hold the poles of free motions as rounding say so."""
 
+from itertools import product
+
 import control
 import numpy as np
 import pytest
@@ -33,3 +35,23 @@ def test_exact_zeros_need_no_word() -> None:
     """A free mass has a pole twice at 0 in any states; of two joined ones it is known to the usual 1e-8."""
     assert not np.isfinite(control.dcgain(mech2ss(mechss([[3.0]], None, None))))
     mech2ss(mechss(np.eye(2), None, [[4.0, -4.0], [-4.0, 4.0]]))
+
+
+@pytest.mark.parametrize("elements", [2, 10, 80])
+def test_the_static_gain_of_a_free_beam_is_infinite_in_every_channel(elements: int) -> None:
+    """Two free motions and one force, at the middle too, which turns nothing: never "no number"."""
+    M, K = beam_matrices(elements, clamped=False)
+    model = mechss(M, None, K)
+    for force, output in product((0, elements, 2 * elements), (0, 1, 2 * elements)):
+        system = mech2ss(model.select(f"F_q{force}", f"q{output}"), states="energy")
+        assert np.isinf(control.dcgain(system))
+
+
+def test_free_motions_of_bodies_apart_stay_apart() -> None:
+    """Two beams that nothing joins: what pushes one gives the rigid momenta of the other exactly nothing."""
+    M, K = beam_matrices(3, clamped=False)
+    none = np.zeros_like(K)
+    model = mechss(np.block([[M, none], [none, M]]), None, np.block([[K, none], [none, 2.0 * K]]))
+    system = mech2ss(model.select("F_q0", "q8"), states="energy")
+    momenta = np.asarray(system.B)[4:8, 0]
+    assert np.count_nonzero(momenta) == 2

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.base.matrix_residual import exact_product
@@ -99,6 +101,7 @@ def free_motions(factor: StiffnessFactor, first: int, i: IndexArray, mass: Float
     with_mass = solved(corner, turned[:, :n_m].T, transposed=True).T
     without = turned[:, n_m:] - with_mass @ beside
     without[i] = 0.0
+    with_mass = with_mass @ _mixing(with_mass)
     rates = np.zeros((d, d))
     rates[np.arange(n_m, d), order[n_m:]] = 1.0
     along, balance = (_carrying(matrix, with_mass, without) for matrix in (C, C.T))
@@ -129,6 +132,22 @@ def _reflectors(raw: FloatArray, tau: FloatArray) -> tuple[FloatArray, FloatArra
     V = np.where(reflects, np.tril(raw, -1) + np.eye(*raw.shape), 0.0)
     inverse = np.triu(V.T @ V, 1) + np.diag(1.0 / np.where(reflects, tau, 1.0))
     return V, solved(inverse, V.T)
+
+
+def _mixing(motions: FloatArray) -> FloatArray:
+    """Return a reflection that mixes free motions of one body, which are alike: no input then drives one of them alone.
+
+    Where one did, python-control would find a zero at exactly 0 beside the poles there, and a static gain that is no
+    number instead of infinite. Motions of DOFs apart stay apart.
+    """
+    moved = (motions != 0.0).astype(int)
+    _, body = connected_components(csr_array(moved.T @ moved), directed=False)
+    mixing = np.eye(motions.shape[1])
+    for number in np.unique(body[np.bincount(body)[body] > 1]):
+        own = np.flatnonzero(body == number)
+        v = np.sqrt(np.arange(2.0, own.size + 2.0))
+        mixing[np.ix_(own, own)] -= (2.0 / float(v @ v)) * np.outer(v, v)
+    return mixing
 
 
 def _carrying(C: FloatArray, with_mass: FloatArray, without: FloatArray) -> FloatArray:
