@@ -23,6 +23,7 @@ from halfdof_ctrl.reduction.energy.cholesky import solved
 from halfdof_ctrl.reduction.energy.rigid import StiffnessFactor
 
 MASSLESS_MOMENTUM = 64.0  #: times n eps of the terms: a smaller momentum of a free motion is rounding
+MOVED = 1e-9  #: of the largest displacement of a free motion: DOFs that move less are not of its body
 BALANCED_FORCES = 4 * EPS  #: of the terms: forces of dampers that cancel to this part are rounding of their entries
 
 
@@ -140,7 +141,8 @@ def _mixing(motions: FloatArray) -> FloatArray:
     Where one did, python-control would find a zero at exactly 0 beside the poles there, and a static gain that is no
     number instead of infinite. Motions of DOFs apart stay apart.
     """
-    moved = (motions != 0.0).astype(int)
+    size = np.abs(motions)
+    moved = (size > MOVED * size.max(axis=0, initial=0.0)).astype(int)
     _, body = connected_components(csr_array(moved.T @ moved), directed=False)
     mixing = np.eye(motions.shape[1])
     for number in np.unique(body[np.bincount(body)[body] > 1]):

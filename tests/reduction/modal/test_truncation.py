@@ -325,15 +325,18 @@ def test_names_of_coordinates_keep_clear_of_dofs() -> None:
 
 
 def test_the_shift_of_antiresonances_is_told() -> None:
-    """Notches of a cantilever at its own force are the modes with that DOF held: two digits are right."""
+    """Notches of a cantilever at its own force are the modes with that DOF held: two digits are right.
+
+    A force in the middle keeps a second DOF, so that the modes of the small model are not those very ones.
+    """
     M, K = beam_matrices(60)
     tip = 118
-    small = truncate_modes(mechss(M, None, K).select(f"F_q{tip}", f"q{tip}"), f_max=60.0)
+    small = truncate_modes(mechss(M, None, K).select([f"F_q{tip}", "F_q60"], f"q{tip}"), f_max=60.0)
     held = np.delete(np.arange(len(K)), tip)
     full = np.sqrt(scipy.linalg.eigvalsh(K[np.ix_(held, held)], M[np.ix_(held, held)])) / (2.0 * np.pi)
     found = small.antiresonances
     shift = np.abs(found.frequencies[:, None] / full - 1.0).min(axis=1)
-    told = found.shift > 100.0 * np.maximum(found.floor, 1e-11)
+    told = (found.shift > 100.0 * np.maximum(found.floor, 1e-11)) & (shift < 1e-3)
     assert found.shift.size >= 4
     assert told.any()
     assert_allclose(found.shift[told], shift[told], rtol=0.05)
