@@ -183,3 +183,16 @@ def test_reference_of_another_size_is_refused() -> None:
     """A reference must have the inputs and outputs of the system."""
     with pytest.raises(ParameterError, match="1 outputs and 1 inputs"):
         bode_plot(mech2ss(mount()), reference=hydromount())
+
+
+def test_needles_and_notches_of_undamped_structures_leave_the_axis() -> None:
+    """Peaks of 1e10 times what lies between them: the axis shows the rest, curve and markers stay on 0 and -180."""
+    K = 2.0 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
+    cplt = bode_plot(mechss(np.eye(6), None, K).select("F_q0", "q0"))
+    low, high = cplt.axes[0, 0].get_ylim()
+    assert high < 1e6
+    assert low > 1e-12
+    for line in cplt.lines[1, 0]:
+        phase = np.asarray(line.get_ydata(), dtype=float)
+        phase = phase[np.isfinite(phase)]
+        assert (np.abs(phase + 90.0) <= 90.0 + 1e-6).all()
