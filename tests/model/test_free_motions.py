@@ -49,7 +49,7 @@ def test_beams_float_by_two_motions_or_by_none(elements: int) -> None:
 
 
 def test_a_beam_from_a_file_with_ten_digits_floats_to_its_rounding() -> None:
-    """Entries of ten digits give the rotation an energy of 1e-10: known to more, it were a spring; translation stays."""
+    """Entries of ten digits give the rotation an energy of 1e-10: known to more, it were a spring."""
     M, K = beam_matrices(7, clamped=False)
     rounded = np.vectorize(lambda value: float(f"{value / 3.0:.9e}"))(K)
     exact = free_motion_count(M, 0.0 * K, rounded)
