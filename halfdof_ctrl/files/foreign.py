@@ -26,9 +26,9 @@ FOREIGN_ENDINGS = {
     ".xls": ("a spreadsheet", "save each matrix as csv"),
     ".m": ("a program of MATLAB", "run it, and save the matrices: save('model.mat','M','C','K','-v7')"),
     ".fig": ("a figure of MATLAB", "save the matrices: save('model.mat','M','C','K','-v7')"),
-    ".pkl": ("a pickle, which can run code and is never read", "halfdof_ctrl.save_model or numpy.savez"),
-    ".pickle": ("a pickle, which can run code and is never read", "halfdof_ctrl.save_model or numpy.savez"),
-    ".joblib": ("a pickle, which can run code and is never read", "halfdof_ctrl.save_model or numpy.savez"),
+    ".pkl": ("a pickle (it can run code)", "halfdof_ctrl.save_model or numpy.savez"),
+    ".pickle": ("a pickle (it can run code)", "halfdof_ctrl.save_model or numpy.savez"),
+    ".joblib": ("a pickle (it can run code)", "halfdof_ctrl.save_model or numpy.savez"),
 }  #: by ending: what it is, and what to write instead
 OCTAVE = (b"# Created by Octave", b"Octave-1")
 BEGINNINGS = (
@@ -61,7 +61,4 @@ as text (job_STIF1.mtx).'
         found = list(FOREIGN_ENDINGS[".op2"])
     if found is None and path.suffix.lower() in FOREIGN_ENDINGS:
         found = list(FOREIGN_ENDINGS[path.suffix.lower()])
-    if found is None:
-        return None
-    also = "" if found[0].endswith("read") else ", which is not read"
-    return f"this is {found[0]}{also}. Instead: {found[1]}."
+    return None if found is None else f"this is {found[0]}, which is not read. Instead: {found[1]}."

@@ -47,7 +47,7 @@ def random_model(seed: int) -> SecondOrderModel:
     rng = np.random.default_rng(seed)
 
     def matrix(rows: int, columns: int) -> npt.NDArray[np.float64]:
-        decades = np.ldexp(1.0, rng.integers(-600, 600, (rows, columns)))
+        decades = np.ldexp(1.0, rng.integers(-400, 400, (rows, columns)))
         return np.asarray(rng.normal(size=(rows, columns)) * decades * (rng.random((rows, columns)) < 0.8))
 
     return mechss(
