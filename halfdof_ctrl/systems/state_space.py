@@ -32,6 +32,7 @@ from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
+from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 Improper: TypeAlias = Literal["refuse", "drop"]
@@ -106,8 +107,9 @@ def mech2ss(
     CloseDecisionWarning
         In energy or modal states, K nearly leaves a motion free.
     LostDigitsWarning
-        python-control's evaluation of this system (``sys(s)``, `control.bode_plot`) will lose more than 1e-6, since it
-        does not balance states of different sizes. Measured beside the slowest modes, for up to 1000 states.
+        Poles at the origin, of motions that K and C leave free, are moved by rounding; or python-control's evaluation
+        of this system (``sys(s)``, `control.bode_plot`) will lose more than 1e-6, since it does not balance states of
+        different sizes. Measured beside the slowest modes, for up to 1000 states.
 
     Examples
     --------
@@ -127,7 +129,8 @@ def mech2ss(
         require_matrix(model, "mech2ss", parameter="model")
         model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
     system = system_of_model(model, improper=improper, states=states)
-    warn_of_evaluation(system, states)
+    if not warn_of_free_motions(model.model if isinstance(model, ExactReduction) else model, system, states):
+        warn_of_evaluation(system, states)
     return system
 
 

@@ -1,0 +1,54 @@
+"""The state space as users get it: with a word where it holds free motions as rounding.
+
+In DOF states the stiffness of a body that floats cancels in sums, not entry by entry: eigenvalue solvers find poles at
+1e-8 of the other poles in the place of 0, also where A is singular to the last bit, and a static gain that is infinite
+comes out finite, of any sign. That is usual; where much more is lost it is said.
+"""
+
+import control
+import numpy as np
+from scipy.linalg.lapack import dgetrf
+
+from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
+from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.model.free_motions import LARGEST, free_motion_count
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.state_map import States
+
+USUAL_SPURIOUS = 1e-6  #: of the slowest other pole: a double pole at 0 is moved by 1e-8 of it in any case
+SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
+
+
+def warn_of_free_motions(model: SecondOrderModel, sys: control.StateSpace, states: States) -> bool:
+    """Warn of poles at the origin that a state space does not hold as such, and return whether there are.
+
+    Warns
+    -----
+    LostDigitsWarning
+        Rounding of A moves them further than that of a double pole does.
+    """
+    A = np.asarray(sys.A, dtype=float)
+    if states not in ("dofs", "scaled") or A.size == 0 or len(model.dofs) > LARGEST or not _may_be_singular(A):
+        return False
+    free = free_motion_count(model.M, model.C, model.K)
+    if free is None:
+        return False
+    size = np.sort(np.abs(np.linalg.eigvals(A)))
+    spurious, slowest = float(size[free.poles - 1]), float(size[min(free.poles, size.size - 1)])
+    if not spurious > USUAL_SPURIOUS * slowest:
+        return False
+    msg = (
+        f"The model has {free.in_words()}. In these states rounding of A moves them to {spurious:.1e} rad/s, "
+        f"beside a slowest other pole of {slowest:.1e} rad/s, and the static gain of python-control is finite. "
+        "mech2ss(model, states='energy') keeps them at 0; frequency_response(model) and the plots know them."
+    )
+    give_warning(msg, LostDigitsWarning)
+    return True
+
+
+def _may_be_singular(A: FloatArray) -> bool:
+    """Tell whether elimination meets a pivot that is zero or nearly so."""
+    factors, _, _ = dgetrf(balanced_states(A)[0])
+    pivots = np.abs(np.diagonal(factors))
+    return bool(pivots.min() <= SMALL_PIVOT * pivots.max())
