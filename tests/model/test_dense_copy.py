@@ -12,7 +12,6 @@ from scipy.sparse import eye_array
 from halfdof_ctrl import (
     SecondOrderModel,
     crosscheck,
-    hydromount,
     lqr,
     mech2ss,
     mechss,
@@ -28,7 +27,6 @@ from support.fe_models import spring_grid
 WORKS: list[tuple[str, Callable[[SecondOrderModel], Any]]] = [
     ("pencil_structure", pencil_structure),
     ("zeros", zeros),
-    ("crosscheck", lambda model: crosscheck(model, mech2ss(hydromount().select("F_y", "y")))),
     ("write_report", lambda model: write_report(model, Path("nowhere"))),
     ("default_effort", default_effort),
     ("pencil_structure", pole_map_plot),
