@@ -9,16 +9,15 @@ import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from itertools import chain, islice
-from typing import Any, Literal, TypeAlias, TypeVar
+from typing import Literal, TypeAlias
 
 import numpy as np
 
-from halfdof_ctrl.base.doors import described, shown, wrong_object
+from halfdof_ctrl.base.doors import described, shown
 from halfdof_ctrl.base.errors import SignalNameError
 from halfdof_ctrl.base.near_names import nearest_names
 
 Names: TypeAlias = str | Sequence[str] | None
-Value = TypeVar("Value")
 
 DERIVATIVE_SUFFIXES = ("", "_dot", "_ddot")
 FORCE_PREFIX = "F_"
@@ -267,36 +266,6 @@ def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
     except Exception as cause:  # an array without dimensions, a class, an object that fails
         raise _no_names_error(names, what) from cause
     return found if all([type(name) is str for name in found]) else _as_texts(found, what)  # noqa: C419  # faster
-
-
-def by_name(given: Mapping[Any, Value], known: Sequence[str], what: str) -> dict[str, Value]:
-    """Read a mapping from names of a model; whole numbers are read as text.
-
-    Raises
-    ------
-    SignalNameError
-        A name that is not known.
-    WrongObjectError
-        A mapping that does not give what it holds.
-
-    Examples
-    --------
-    >>> by_name({101: 2.0}, ("100", "101"), "DOF")
-    {'101': 2.0}
-    """
-    try:
-        items = list(given.items())
-    except Exception as cause:
-        raise wrong_object("This argument", f"a mapping from {what} to numbers", given, parameter=what) from cause
-    among = known if len(items) <= MOST_LISTED else set(known)
-    found: dict[str, Value] = {}
-    for key, value in items:
-        number = isinstance(key, int | np.integer) and not isinstance(key, bool)
-        name = str(key) if isinstance(key, str) or (number and abs(key) <= LARGEST_NUMBER) else None
-        if name is None or name not in among:
-            raise unknown_name_error(key if name is None else name, what, known)
-        found[name] = value
-    return found
 
 
 def _no_names_error(given: object, what: str) -> SignalNameError:

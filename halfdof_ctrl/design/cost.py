@@ -18,10 +18,11 @@ from halfdof_ctrl.base.arrays import (
     require_range,
     without_short_forms,
 )
+from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import is_real_number, shown, wrong_object
 from halfdof_ctrl.base.errors import ImproperError, WeightError
 from halfdof_ctrl.base.labelled import has_labels, without_labels
-from halfdof_ctrl.base.names import by_name, listed, motion_names
+from halfdof_ctrl.base.names import listed, motion_names
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import system_of_model

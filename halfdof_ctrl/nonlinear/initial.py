@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import real_number, real_numbers
 from halfdof_ctrl.base.errors import MatrixError
-from halfdof_ctrl.base.names import by_name, motion_names
+from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.model.nonlinear import Values
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 from halfdof_ctrl.nonlinear.recovery import motion_at

@@ -17,9 +17,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from halfdof_ctrl.base.arrays import LARGEST_SIZE, SMALLEST_SIZE
+from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.base.names import as_tuple, by_name, listed
+from halfdof_ctrl.base.names import as_tuple, listed
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 

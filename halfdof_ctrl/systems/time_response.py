@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import real_numbers
 from halfdof_ctrl.base.errors import HalfdofError, ParameterError
-from halfdof_ctrl.base.names import by_name, control_label, control_labels
+from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import exact_reduction

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import real_number, real_numbers, shown, wrong_object
 from halfdof_ctrl.base.errors import InconsistentStateError, MatrixError, ParameterError
-from halfdof_ctrl.base.names import by_name, motion_names, unknown_name_error
+from halfdof_ctrl.base.names import motion_names, unknown_name_error
 
 CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
 
