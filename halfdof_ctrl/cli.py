@@ -21,10 +21,10 @@ from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedRe
 from halfdof_ctrl.base.names import printable
 from halfdof_ctrl.base.progress import activity, clear_activity
 from halfdof_ctrl.commands import (
-    BUILT_IN,
+    BUILT_IN_MODELS,
     DONE,
-    REFUSED,
-    WEIGHTS,
+    EXIT_REFUSED,
+    WEIGHT_KINDS,
     run_bode,
     run_check,
     run_info,
@@ -38,7 +38,7 @@ from halfdof_ctrl.commands import (
 )
 from halfdof_ctrl.plots.figure_files import without_windows
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
-from halfdof_ctrl.systems.state_map import KINDS
+from halfdof_ctrl.systems.state_map import STATE_KINDS
 from halfdof_ctrl.terminal import TerminatedError, asked_output_only, orderly_end
 
 if TYPE_CHECKING:
@@ -83,10 +83,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         return TERMINATED
     except HalfdofError as refusal:
         _say("error", str(refusal))
-        return REFUSED
+        return EXIT_REFUSED
     except OSError as refusal:
         _say("error", f"{refusal.filename or 'file'}: {refusal.strerror or refusal}")
-        return REFUSED
+        return EXIT_REFUSED
     return code
 
 
@@ -114,7 +114,7 @@ class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Print one line, whatever the arguments contain, and end."""
         _say("error", f"{message}. usage: {self.prog} --help lists what can be given.")
-        raise SystemExit(REFUSED)
+        raise SystemExit(EXIT_REFUSED)
 
     def _print_message(self, message: str, file: "SupportsWrite[str] | None" = None) -> None:
         """Print help; what cannot be printed is an error, which argparse keeps to itself."""
@@ -163,7 +163,9 @@ def _parser() -> argparse.ArgumentParser:
     )
     add("info", run_info, "print what is in the files, the model, its pencil and its reduction", None)
     ss = add("ss", run_ss, "print the state space, or write it (npz, mat)", "FILE")
-    ss.add_argument("--states", action=_Once, choices=KINDS, default="dofs", help="what the states are (default: dofs)")
+    ss.add_argument(
+        "--states", action=_Once, choices=STATE_KINDS, default="dofs", help="what the states are (default: dofs)"
+    )
     bode = add("bode", run_bode, "write the Bode diagram (png, svg, pdf) or its numbers (csv)", "FILE", needed=True)
     _add_frequencies(bode)
     bode.add_argument("--hz", action="store_true", help="frequency axis of the figure in Hz")
@@ -193,7 +195,7 @@ def _parser() -> argparse.ArgumentParser:
     passed.add_argument("--db", action="store_true", help="modulus of the figure in dB")
     passed.add_argument("--linear", action="store_true", help="linear axes and frequencies instead of logarithmic ones")
     regulator = add("lqr", run_lqr, "print a linear quadratic regulator; write its gain or pole map", "FILE")
-    for kind in WEIGHTS:
+    for kind in WEIGHT_KINDS:
         regulator.add_argument(f"--{kind}", action="append", default=[], metavar="NAME=W", help=f"weight of {kind}^2")
     regulator.add_argument(
         "--energy", action=_Once, type=float, metavar="W", help="weight of the mechanical energy [1/J]"
@@ -208,7 +210,7 @@ def _print_help(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
 
 
 def _known_parameters() -> str:
-    known = (f"of {name}: {', '.join(inspect.signature(make).parameters)}" for name, make in BUILT_IN.items())
+    known = (f"of {name}: {', '.join(inspect.signature(make).parameters)}" for name, make in BUILT_IN_MODELS.items())
     return f"parameter of a built-in model; {'; '.join(known)}"
 
 
@@ -243,7 +245,7 @@ def _add_command(
     parser.add_argument(
         "model",
         metavar="MODEL",
-        help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN)}",
+        help=f"a file, a folder with exported matrices, or a built-in model: {', '.join(BUILT_IN_MODELS)}",
     )
     parser.add_argument("-p", action="append", default=[], metavar="NAME=VALUE", help=_known_parameters())
     what = "name of a matrix in a file with several: C=D, K=sys.K, M=maa#2; C= for none"

@@ -65,9 +65,9 @@ from halfdof_ctrl.systems.stiffness import (
 from halfdof_ctrl.systems.time_response import step_response
 from halfdof_ctrl.systems.working_states import working_matrix, working_system
 
-DONE, CHECK_FAILED, REFUSED = 0, 1, 2
+DONE, CHECK_FAILED, EXIT_REFUSED = 0, 1, 2
 _Signals: TypeAlias = tuple[tuple[str, ...], tuple[str, ...]]
-BUILT_IN = {"hydromount": hydromount}
+BUILT_IN_MODELS = {"hydromount": hydromount}
 BUILT_IN_SIGNALS: dict[str, _Signals] = {
     "hydromount": (("F_y",), ("y", "y_dot"))
 }  #: what is shown unless the user asks for others
@@ -75,9 +75,9 @@ BUILT_IN_ALONE = {"hydromount": {"m": 0.0}}  #: parameters of the part without w
 BUILT_IN_DOF = {"hydromount": "y"}  #: whose dynamic stiffness is meant
 SURE = 10.0  #: bounds by which the real part of a pole exceeds zero where it is called unstable
 CHOSEN_SIGNALS = 3  #: inputs, and outputs, of a large model for which none are given
-LARGEST_PENCIL = 500  #: DOFs up to which `info` takes the time for QZ
+LARGEST_PRINTED = 500  #: DOFs up to which `info` takes the time for QZ
 FIGURE_ENDINGS = (".png", ".svg", ".pdf")
-WEIGHTS = ("displacement", "velocity", "acceleration", "effort")
+WEIGHT_KINDS = ("displacement", "velocity", "acceleration", "effort")
 
 
 def run_report(arguments: argparse.Namespace) -> int:
@@ -93,10 +93,10 @@ def run_report(arguments: argparse.Namespace) -> int:
 
 def run_info(arguments: argparse.Namespace) -> int:
     """Print what a model is."""
-    if arguments.model not in BUILT_IN and (several := several_models(Path(arguments.model))):
+    if arguments.model not in BUILT_IN_MODELS and (several := several_models(Path(arguments.model))):
         print(several, flush=True)
         return DONE
-    if arguments.model not in BUILT_IN and Path(arguments.model).exists() and not arguments.p:
+    if arguments.model not in BUILT_IN_MODELS and Path(arguments.model).exists() and not arguments.p:
         print(inspect_files(arguments.model, **_file_options(arguments)), flush=True)
     given = _given_model(arguments)
     if isinstance(given, NonlinearModel):
@@ -104,11 +104,11 @@ def run_info(arguments: argparse.Namespace) -> int:
         return DONE
     model = given
     print(model)
-    if len(model.dofs) > LARGEST_PENCIL:
+    if len(model.dofs) > LARGEST_PRINTED:
         if not model.is_sparse:
-            print(f"Pencil and reduction: not shown above {LARGEST_PENCIL} DOFs.")
+            print(f"Pencil and reduction: not shown above {LARGEST_PRINTED} DOFs.")
             return DONE
-        print(f"Pencil: not shown above {LARGEST_PENCIL} DOFs.")
+        print(f"Pencil: not shown above {LARGEST_PRINTED} DOFs.")
         model = model.select(model.inputs[0], model.outputs[0])  # others change nothing in what is printed
     else:
         structure = pencil_structure(model)
@@ -126,8 +126,8 @@ def run_info(arguments: argparse.Namespace) -> int:
 
 def _unstable_in_words(model: SecondOrderModel, order: int) -> str:
     """Say which poles are right of the imaginary axis by more than rounding; nothing where none is."""
-    if order > LARGEST_PENCIL:
-        return f"Stability: not looked at above {LARGEST_PENCIL} states.\n"
+    if order > LARGEST_PRINTED:
+        return f"Stability: not looked at above {LARGEST_PRINTED} states.\n"
     poles = bounded_poles(working_matrix(model))
     unstable = poles.values[poles.values.real > SURE * poles.bounds]
     if not unstable.size:
@@ -315,19 +315,19 @@ def _given_model(arguments: argparse.Namespace) -> SecondOrderModel | NonlinearM
     name: str = arguments.model
     signals: _Signals | None = None
     model: SecondOrderModel | NonlinearModel
-    if name in BUILT_IN:
+    if name in BUILT_IN_MODELS:
         if arguments.matrix or arguments.triangle or arguments.remove_fixed:
             msg = f"--matrix, --triangle and --remove-fixed are about files; {name} is built in."
             raise ParameterError(msg, parameter="--matrix", value=arguments.matrix)
         signals = BUILT_IN_SIGNALS[name]
         alone = BUILT_IN_ALONE[name] if arguments.alone else {}
-        model = BUILT_IN[name](**(alone | _parameters(name, arguments.p)))
+        model = BUILT_IN_MODELS[name](**(alone | _parameters(name, arguments.p)))
     else:
         if arguments.p:
-            msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN)}); {name} is a file."
+            msg = f"-p changes parameters of built-in models ({', '.join(BUILT_IN_MODELS)}); {name} is a file."
             raise ParameterError(msg, parameter="-p", value=arguments.p)
         if not Path(name).exists() and Path(name).suffix.lower() not in MATRIX_ENDINGS:
-            msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN)}."
+            msg = f"{name}: neither a file nor a built-in model. Built in: {', '.join(BUILT_IN_MODELS)}."
             raise FileFormatError(msg, path=name)
         model = load_model(name, **_file_options(arguments))
     elements = [element_from_text(text) for text in arguments.element]
@@ -366,7 +366,7 @@ def _driven(model: SecondOrderModel, arguments: argparse.Namespace) -> list[str]
 
 
 def _parameters(name: str, given: Sequence[str]) -> dict[str, float]:
-    known = list(inspect.signature(BUILT_IN[name]).parameters)
+    known = list(inspect.signature(BUILT_IN_MODELS[name]).parameters)
     parameters = assignments(given, "-p")
     for symbol in parameters:
         if symbol not in known:
@@ -386,7 +386,9 @@ def _with_recovered(model: SecondOrderModel) -> SecondOrderModel:
 
 
 def _feedback(model: SecondOrderModel, arguments: argparse.Namespace) -> tuple[StateFeedback, str]:
-    weights = {kind: assignments(listed_names(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHTS}
+    weights = {
+        kind: assignments(listed_names(getattr(arguments, kind), ()), f"--{kind}") or None for kind in WEIGHT_KINDS
+    }
     if arguments.energy is None and not any(weights.values()):
         return default_design(model)
     return lqr(

@@ -12,7 +12,7 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.files.containers import ending
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS
 
-FEWEST_POINTS, MOST_POINTS = 2, 1_000_000
+OPTION_TEXTS_FEWEST_POINTS, MOST_ASKED = 2, 1_000_000
 
 
 def _one_limit(omega: float | None, frequency: float | None, which: str) -> float | None:
@@ -80,8 +80,8 @@ def chosen_frequencies(
         msg = f"The frequencies from --omega-min {low:.4g} to --omega-max {high:.4g} rad/s must be positive and rise."
         raise ParameterError(msg, parameter="--omega-min", value=low)
     points = usual if points is None else points
-    if not FEWEST_POINTS <= points <= MOST_POINTS:
-        msg = f"--points {points}, but a range of frequencies has {FEWEST_POINTS} to {MOST_POINTS} of them."
+    if not OPTION_TEXTS_FEWEST_POINTS <= points <= MOST_ASKED:
+        msg = f"--points {points}, but a range of frequencies has {OPTION_TEXTS_FEWEST_POINTS} to {MOST_ASKED} of them."
         raise ParameterError(msg, parameter="--points", value=points)
     return np.linspace(low, high, points) if linear else np.geomspace(low, high, points)
 

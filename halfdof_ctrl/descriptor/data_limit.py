@@ -14,7 +14,7 @@ from halfdof_ctrl.model.evaluation import data_limit, transfer_and_growth
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-WARNED = 1e-6  #: part of the value from which (DATA) is told
+WARNED_DATA = 1e-6  #: part of the value from which (DATA) is told
 AMPLIFIED = 100.0  #: and times the rounding of a file with few digits, which no one expects to see less of
 MOST_LOOKED, MOST_CHANNELS = 16, 32  #: frequencies, and outputs or inputs, at which (DATA) is found beside a response
 LAST_DIGIT = "their last digit (2.2e-16)"
@@ -84,7 +84,7 @@ def warn_of_data(
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         told = (size > 0.0) & np.isfinite(size) & (limit.data > max(SMALL_SHIFT, AMPLIFIED * known) * limit.slope)
         share = np.where(told, limit.data / size, 0.0)
-    warned = max(WARNED, AMPLIFIED * known)
+    warned = max(WARNED_DATA, AMPLIFIED * known)
     if not share.size or not share.max() > warned:
         return
     i, j, k = np.unravel_index(int(np.argmax(share)), share.shape)

@@ -26,19 +26,19 @@ from halfdof_ctrl.descriptor.residues import PRIMES
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 from halfdof_ctrl.descriptor.unit_ranges import over_more_decades
 
-OUTSIDE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
-TINY = 1e-3  #: in the unit of a polynomial: estimates below may stand for zeros where nothing else is known
+OUTSIDE_CIRCLE = 8.0  #: circles around what is known have this radius, in units of the largest, or the smallest over it
+TINY_CIRCLE = 1e-3  #: in the unit of a polynomial: estimates below may stand for zeros where nothing else is known
 FAINT = 1e-4  #: relative bound above which an eigenvalue far from all others stands for zero or infinity
-FAR = 100.0  #: ratio to the next one
+FAR_CIRCLE = 100.0  #: ratio to the next one
 PLACES = (
     0.5,
     0.75,
     0.25,
     0.9,
 )  #: between the inner and the outer eigenvalues, in the logarithm, where circles are tried
-AROUND = 0.3  #: of the largest: eigenvalues around zero have a smaller mean
+GROUP_AROUND = 0.3  #: of the largest: eigenvalues around zero have a smaller mean
 CHECKS = 5  #: points at which the list is proved
-SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
+FINITE_SPECTRUM_SAME = 1e-3  #: of the number of eigenvalues: largest difference of the two sides there
 DIRECTION_SEED = 7  #: of the directions of these points
 
 
@@ -139,9 +139,11 @@ def _count_missing_zeros(polynomial: ScaledPolynomial, found: _Findings, counts:
     size = np.abs(found.listed.values)
     if size.size == 0 or found.zeros + size.size == counts.degree:
         return
-    around, below = (contour(polynomial, 0.0, radius).count for radius in (OUTSIDE * size.max(), size.min() / OUTSIDE))
+    around, below = (
+        contour(polynomial, 0.0, radius).count for radius in (OUTSIDE_CIRCLE * size.max(), size.min() / OUTSIDE_CIRCLE)
+    )
     if around is not None and below is not None and around == below + size.size and below > found.zeros:
-        found.zeros, found.radius = below, max(found.radius, float(np.sqrt(TINY) * size.min()))
+        found.zeros, found.radius = below, max(found.radius, float(np.sqrt(TINY_CIRCLE) * size.min()))
 
 
 def _doubt_far_ones(polynomial: ScaledPolynomial, found: _Findings) -> None:
@@ -153,7 +155,7 @@ def _doubt_far_ones(polynomial: ScaledPolynomial, found: _Findings) -> None:
     values, bounds = found.listed.values, found.listed.bounds
     size = np.abs(values)
     clear = bounds <= FAINT * size
-    far = ~clear & (size > FAR * size[clear].max(initial=0.0))
+    far = ~clear & (size > FAR_CIRCLE * size[clear].max(initial=0.0))
     lost = far & ~(bounds <= (KNOWN if clear.any() else 1.0) * size)
     far &= clear.any()
     close = far & ~lost
@@ -191,9 +193,9 @@ def _is_told(estimates: Estimates) -> npt.NDArray[np.bool_]:
     if clear.size == 0:
         return told
     first, last = int(clear[0]), int(clear[-1])
-    if last + 1 < places.size and size[last + 1] > FAR * size[last]:
+    if last + 1 < places.size and size[last + 1] > FAR_CIRCLE * size[last]:
         told[places[last + 1 :]] = False
-    if first > 0 and size[first] > FAR * size[first - 1]:
+    if first > 0 and size[first] > FAR_CIRCLE * size[first - 1]:
         told[places[:first]] = False
     return told
 
@@ -202,7 +204,7 @@ def _near_zero(estimates: Estimates, exact: int, *, is_real: bool) -> npt.NDArra
     """Return which estimates stand for eigenvalues at the origin: below all known ones, and not told from zero."""
     size = np.abs(estimates.values)
     known = np.flatnonzero(_is_told(estimates))
-    below = np.arange(size.size) < known[0] if known.size else size <= TINY
+    below = np.arange(size.size) < known[0] if known.size else size <= TINY_CIRCLE
     near = below & ~(estimates.bounds <= FAINT * size)  # bounds may be nan where all is zero
     total = 0
     for k, value in enumerate(estimates.values):
@@ -219,16 +221,16 @@ def _count_zeros(
     """Count what is not told from zero by a circle between it and the rest; none if it is not around zero."""
     size = np.abs(estimates.values)
     inner, outer = float(size[near].max(initial=0.0)), float(size[~near].min(initial=np.inf))
-    spread = float(np.maximum(size, np.minimum(estimates.radii, TINY))[near].max(initial=0.0))
+    spread = float(np.maximum(size, np.minimum(estimates.radii, TINY_CIRCLE))[near].max(initial=0.0))
     if not np.isfinite(outer):
-        outer = OUTSIDE**2 * max(inner, TINY)
+        outer = OUTSIDE_CIRCLE**2 * max(inner, TINY_CIRCLE)
     for part in PLACES:
-        radius = max(inner, TINY**3 * outer) ** (1.0 - part) * outer**part
+        radius = max(inner, TINY_CIRCLE**3 * outer) ** (1.0 - part) * outer**part
         circle = contour(polynomial, 0.0, radius)
         if circle.count is None:
             continue
         mean = abs(complex(circle.moments[1] * radius)) / max(circle.count, 1)
-        if mean > AROUND * inner and mean > TINY**2 * radius:
+        if mean > GROUP_AROUND * inner and mean > TINY_CIRCLE**2 * radius:
             return exact, 0.0
         return max(circle.count, exact), min(spread, radius)
     return max(int(_weights(polynomial, estimates)[near].sum()), exact), spread
@@ -252,7 +254,7 @@ def _within_gap(
         return None
     inner = size[place[0]]
     outer = size[place[0] + 1] if place[0] + 1 < size.size else np.inf
-    radius = np.sqrt(inner * outer) if np.isfinite(outer) else OUTSIDE * inner
+    radius = np.sqrt(inner * outer) if np.isfinite(outer) else OUTSIDE_CIRCLE * inner
     if not 0.0 < radius < np.inf or contour(polynomial, 0.0, radius).count != degree:
         return None
     return np.asarray((np.arange(size.size) <= place[0]) & ~near)
@@ -268,7 +270,7 @@ def _within_circle(
 ) -> npt.NDArray[np.bool_] | None:
     """Take all estimates in a circle around the known ones, if they are as many as it holds; None otherwise."""
     size = np.abs(estimates.values)
-    radius = OUTSIDE * float(size[known].max(initial=0.0))
+    radius = OUTSIDE_CIRCLE * float(size[known].max(initial=0.0))
     inside = (size < radius) & ~near
     if int(weights[inside].sum()) == int(weights[known].sum()):
         return None
@@ -288,7 +290,7 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
             "numbers have such eigenvalues instead of zeros"
         )
     if total != counts.degree:
-        within = contour(polynomial, 0.0, OUTSIDE * largest).count if largest > 0.0 else None
+        within = contour(polynomial, 0.0, OUTSIDE_CIRCLE * largest).count if largest > 0.0 else None
         told = f"{total} eigenvalues are told from rounding, up to {largest * polynomial.unit:.3g} rad/s"
         if within == total:
             more = counts.degree - total
@@ -322,7 +324,7 @@ def _is_proved(polynomial: ScaledPolynomial, found: _Findings, largest: float) -
         right = points * polynomial.logarithmic_derivative(points)
         left = found.zeros + (points[:, None] / (points[:, None] - values)).sum(axis=1)
         difference = np.abs(left - right)
-        room = SAME * max(1.0, np.sqrt(values.size + found.zeros)) + _slack(points, found)
+        room = FINITE_SPECTRUM_SAME * max(1.0, np.sqrt(values.size + found.zeros)) + _slack(points, found)
     return bool((np.isfinite(difference) & (difference <= room)).all())
 
 

@@ -17,7 +17,7 @@ from halfdof_ctrl.descriptor.contours import Contour, contour
 from halfdof_ctrl.descriptor.quotients import Estimates
 from halfdof_ctrl.descriptor.scaled_polynomial import ScaledPolynomial
 
-REACH = 8.0  #: estimates within so many of their bounds belong together
+GROUP_REACH = 8.0  #: estimates within so many of their bounds belong together
 SAME_GROUP = 1e-6  #: estimates that were not settled and are closer than this part of their size belong together
 WELL_KNOWN = 1e-9  #: relative bound below which estimates stand for themselves, however close they are
 GROUP_CLEARANCE = 6.0  #: ratio of the distance of the next eigenvalue to the spread of a group
@@ -98,7 +98,7 @@ def _groups(values: ComplexArray, bounds: FloatArray, doubtful: npt.NDArray[np.b
     places = np.flatnonzero(doubtful)
     v, b = values[places], np.minimum(bounds[places], np.abs(values[places]))
     distance = np.abs(v[:, None] - v)
-    near = (distance <= REACH * (b[:, None] + b)) & (distance <= 0.7 * np.maximum(np.abs(v)[:, None], np.abs(v)))
+    near = (distance <= GROUP_REACH * (b[:, None] + b)) & (distance <= 0.7 * np.maximum(np.abs(v)[:, None], np.abs(v)))
     near |= distance <= SAME_GROUP * np.abs(v)
     count, labels = connected_components(csr_array(near.astype(np.int8)), directed=False)
     return [places[labels == label] for label in range(count)]

@@ -23,7 +23,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 IntArray = npt.NDArray[np.int64]
 
 RADIUS = 8.0  #: of the circle, in units of the largest finite eigenvalue
-FEWEST_POINTS = 32  #: on the circle: the strictly proper part returns with 8^-24 at most
+FEWEST_GROWTH_POINTS = 32  #: on the circle: the strictly proper part returns with 8^-24 at most
 NO_GROWTH = -1000  #: degree of a polynomial that is zero
 ROUNDED = 16.0  #: coefficients below so many of their rounding errors are zero
 CLEAR = 4096.0  #: coefficients above so many are not
@@ -107,7 +107,7 @@ def _by_circle(
 ) -> tuple[IntArray, npt.NDArray[np.bool_], FloatArray]:
     """Find the last coefficient of each polynomial part, the pairs that are unclear, and sizes in units of rounding."""
     most = int(bound.max())
-    count = max(FEWEST_POINTS, 2 ** int(np.ceil(np.log2(4 * (most + 1)))))
+    count = max(FEWEST_GROWTH_POINTS, 2 ** int(np.ceil(np.log2(4 * (most + 1)))))
     largest = float(np.abs(eigenvalues).max(initial=0.0))
     radius = RADIUS * largest if largest > 0.0 else time_scale(model.quadratics.P)
     points = radius * np.exp(2j * np.pi * np.arange(count) / count)

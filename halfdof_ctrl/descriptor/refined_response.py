@@ -61,7 +61,7 @@ def refined_response(
 
     >>> four, two, one, none = ([np.array([[value]])] for value in (4.0, 2.0, 1.0, 0.0))
     >>> found = refined_response(four, two, one, none, np.array([1j]))
-    >>> found.values[0, 0, 0].real.item(), round(found.data[0, 0, 0].item() / np.finfo(float).eps, 3)
+    >>> found.values[0, 0, 0].real.item(), round(found.data[0, 0, 0].item() / float(np.finfo(float).eps), 3)
     (0.5, 1.5)
     """
     shape = (*D[0].shape, points.size)

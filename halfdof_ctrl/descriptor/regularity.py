@@ -21,7 +21,7 @@ from halfdof_ctrl.model.sparse_evaluation import PointFactors, SparsePencil
 
 SINGULAR_PENCIL = 64 * EPS  #: of the largest singular value: a smallest one below is rounding of zero
 PENCIL_NUDGE = 2.0**-40  #: times the scaled matrix: what is added to its diagonal to find a null vector
-STEPS = 4  #: of inverse iteration
+REGULARITY_STEPS = 4  #: of inverse iteration
 
 
 @limited_threads(1)
@@ -63,7 +63,7 @@ def _smallest_singular_value(pencil: SparsePencil, s: complex) -> tuple[float, F
     vector = generator.standard_normal(matrix.shape[0]) + 1j * generator.standard_normal(matrix.shape[0])
     length = 1.0
     with np.errstate(all="ignore"):
-        for _ in range(STEPS):
+        for _ in range(REGULARITY_STEPS):
             vector = lu.solve(lu.solve(vector / np.linalg.norm(vector), trans="H"))
             length = float(np.linalg.norm(vector))
     largest = float(np.sqrt(abs(matrix).sum(axis=0).max() * abs(matrix).sum(axis=1).max()))

@@ -21,7 +21,7 @@ Places: TypeAlias = npt.NDArray[np.intp]
 
 PRIMES = (2147483629, 2147483549)  #: the largest below 2^31 that are 1 modulo 4
 MANTISSA = 53  #: bits of a double
-HALF = 16  #: bits of the lower half of a residue
+HALF_POINTS = 16  #: bits of the lower half of a residue
 PANEL = 48  #: columns that are searched for pivots at a time
 
 
@@ -48,12 +48,12 @@ def product(left: Residues, right: Residues, p: int) -> Residues:
     """Return the product of two matrices of residues."""
     if 0 in (left.shape[0], *right.shape):
         return np.zeros((left.shape[0], right.shape[1]), dtype=np.int64)
-    mask = (1 << HALF) - 1
-    high, low = (left >> HALF).astype(float), (left & mask).astype(float)
-    top, bottom = (right >> HALF).astype(float), (right & mask).astype(float)
+    mask = (1 << HALF_POINTS) - 1
+    high, low = (left >> HALF_POINTS).astype(float), (left & mask).astype(float)
+    top, bottom = (right >> HALF_POINTS).astype(float), (right & mask).astype(float)
     first, last = high @ top, low @ bottom
     middle = (high + low) @ (top + bottom) - first - last
-    shift = 1 << HALF
+    shift = 1 << HALF_POINTS
     upper = (first.astype(np.int64) % p * shift + middle.astype(np.int64)) % p
     return np.asarray((upper * shift + last.astype(np.int64)) % p)
 

@@ -15,7 +15,7 @@ import scipy.optimize
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 
-FAR = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
+FAR_SCALE = 1e5  #: binary logarithm of frequencies at which the lowest and the highest terms of each entry stand alone
 ABSENT_WEIGHT = 1e9  #: of a place without entry, in the logarithm
 POLYNOMIAL_ENTRIES = 2**20  #: complex entries of P(s) held at a time (16 MB)
 SWEEPS = 3  #: of scaling P(s) at a point, rows and columns in turns
@@ -86,7 +86,7 @@ def mean_frequency(coefficients: Sequence[DenseMatrix]) -> float:
     >>> mean_frequency([rows * np.diag([1.0, 16.0]), np.zeros((2, 2)), rows * np.eye(2)])
     2.0
     """
-    return mean_frequency_between(coefficients, -FAR, FAR)
+    return mean_frequency_between(coefficients, -FAR_SCALE, FAR_SCALE)
 
 
 def mean_frequency_between(coefficients: Sequence[DenseMatrix], low: float, high: float) -> float:

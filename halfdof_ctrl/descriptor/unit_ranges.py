@@ -8,9 +8,9 @@ to the last digit. In the unit that is the mean of the tropical eigenvalues beyo
 import numpy as np
 
 from halfdof_ctrl.descriptor.quotients import Estimates, eigenvalue_estimates
-from halfdof_ctrl.descriptor.scaled_polynomial import FAR, ScaledPolynomial, mean_frequency_between
+from halfdof_ctrl.descriptor.scaled_polynomial import FAR_SCALE, ScaledPolynomial, mean_frequency_between
 
-BEYOND = 10.0  #: binary logarithm of the distance from the known ones at which others are looked for
+BEYOND_RANGE = 10.0  #: binary logarithm of the distance from the known ones at which others are looked for
 
 
 def over_more_decades(polynomial: ScaledPolynomial, estimates: Estimates) -> Estimates:
@@ -18,8 +18,8 @@ def over_more_decades(polynomial: ScaledPolynomial, estimates: Estimates) -> Est
     for is_below in (True, False):
         size = np.abs(estimates.values[estimates.is_known & (estimates.values != 0.0)])
         edge = float(np.log2(size.min() if is_below else size.max())) if size.size else 0.0
-        edge += -BEYOND if is_below else BEYOND
-        low, high = (-FAR, edge) if is_below else (edge, FAR)
+        edge += -BEYOND_RANGE if is_below else BEYOND_RANGE
+        low, high = (-FAR_SCALE, edge) if is_below else (edge, FAR_SCALE)
         unit = mean_frequency_between(polynomial.coefficients, low, high)
         if unit == 1.0 or (unit > 2.0**edge) == is_below:
             continue

@@ -17,9 +17,9 @@ from halfdof_ctrl.base.arrays import FloatArray
 
 Decimals: TypeAlias = npt.NDArray[Any]  #: of `decimal.Decimal`
 
-MOST_STEPS = 300  #: of a sign iteration; one on the imaginary axis never settles
-SETTLED = Decimal("1e-20")  #: an entry that changes by less settles with the next step, to twice the digits
-NEAR = 1e-2  #: changes from which on the iteration converges quadratically, and is not to be scaled any more
+DIGITS_MOST_STEPS = 300  #: of a sign iteration; one on the imaginary axis never settles
+DIGITS_SETTLED = Decimal("1e-20")  #: an entry that changes by less settles with the next step, to twice the digits
+DIGITS_NEAR = 1e-2  #: changes from which on the iteration converges quadratically, and is not to be scaled any more
 
 
 def many_digits(digits: int) -> AbstractContextManager[decimal.Context]:
@@ -76,7 +76,7 @@ def matrix_sign(Z: Decimals) -> Decimals | None:
     None where an eigenvalue is on the imaginary axis, or Z singular.
     """
     quadratic = False
-    for _ in range(MOST_STEPS):
+    for _ in range(DIGITS_MOST_STEPS):
         try:
             inverted, size = inverse(Z)
         except ZeroDivisionError:
@@ -84,9 +84,9 @@ def matrix_sign(Z: Decimals) -> Decimals | None:
         factor = Decimal(1) if quadratic else _power(-size / len(Z))
         new = (Z * factor + inverted / factor) / 2
         change = _change(Z * factor, new)
-        quadratic = quadratic or change < NEAR
+        quadratic = quadratic or change < DIGITS_NEAR
         Z = new
-        if change < SETTLED:
+        if change < DIGITS_SETTLED:
             return Z
     return None
 
@@ -94,7 +94,7 @@ def matrix_sign(Z: Decimals) -> Decimals | None:
 def lyapunov(F: Decimals, sides: list[Decimals]) -> list[Decimals] | None:
     """Solve ``F^T Y + Y F = -S`` for several S by the sign of F; None where F is not stable."""
     quadratic = False
-    for _ in range(MOST_STEPS):
+    for _ in range(DIGITS_MOST_STEPS):
         try:
             inverted, size = inverse(F)
         except ZeroDivisionError:
@@ -103,10 +103,10 @@ def lyapunov(F: Decimals, sides: list[Decimals]) -> list[Decimals] | None:
         new = (F * factor + inverted / factor) / 2
         sides = [(S * factor + inverted.T.dot(S).dot(inverted) / factor) / 2 for S in sides]
         change = _change(F * factor, new)
-        quadratic = quadratic or change < NEAR
+        quadratic = quadratic or change < DIGITS_NEAR
         F = new
-        if change < SETTLED:
-            stable = all(abs(value + 1) < NEAR for value in np.diagonal(F).tolist())
+        if change < DIGITS_SETTLED:
+            stable = all(abs(value + 1) < DIGITS_NEAR for value in np.diagonal(F).tolist())
             return [S / 2 for S in sides] if stable else None
     return None
 

@@ -26,13 +26,13 @@ from halfdof_ctrl.design.modal_basis import ModalBasis
 
 DIGITS = 80  #: of a residual
 SIGN_DIGITS = (160, 400)  #: of a sign, the next if the one before leaves too large a step
-MOST_STEPS = 100  #: of Newton's method, of which each at least halves the distance, from however far
+FEW_STATES_MOST_STEPS = 100  #: of Newton's method, of which each at least halves the distance, from however far
 FROM_AFAR = 0.3  #: steps above this part of the gain halve it, and look alike
 CONTRACTION = 0.75  #: of nearer steps, at least ...
-PATIENCE = 3  #: ... but for so many: more mean that the eigenvectors know nothing of some part
+FEW_STATES_PATIENCE = 3  #: ... but for so many: more mean that the eigenvectors know nothing of some part
 CONVERGED = 1e-18  #: a last step below this part of the gain
-REFINEMENTS = 3  #: of what a random rounding does to X
-NOTHING = 1e-30  #: of the largest effort: that of an input to which nothing is fed back
+FEW_STATES_REFINEMENTS = 3  #: of what a random rounding does to X
+FEW_STATES_NOTHING = 1e-30  #: of the largest effort: that of an input to which nothing is fed back
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -99,16 +99,16 @@ def _improved(problem: CareProblem, exact: _Exact, X: Decimals) -> Decimals | No
     """Take Newton's steps, in doubles, from residuals of many digits; None where they do not shrink."""
     last, idle = np.inf, 0
     rows = doubles(exact.R_inverse.dot(exact.B.T))
-    for _ in range(MOST_STEPS):
+    for _ in range(FEW_STATES_MOST_STEPS):
         gain = exact.gain(X)
         basis = _basis(exact, gain)  # of each step: one that is small beside the gain may double a small damping
         if basis is None:
             return None
         components = basis.components(doubles(exact.residual(X, gain)))
         step, found, unit = basis.bound(rows, components), doubles(gain), np.ones(len(X))
-        length = max(relative_change(step, found, problem.R, size, NOTHING) for size in (unit, basis.scale))
+        length = max(relative_change(step, found, problem.R, size, FEW_STATES_NOTHING) for size in (unit, basis.scale))
         idle += last < FROM_AFAR and length > CONTRACTION * last
-        if not np.isfinite(length) or idle > PATIENCE:
+        if not np.isfinite(length) or idle > FEW_STATES_PATIENCE:
             return None
         X, last = X + decimals(basis.solution(components)), length
         if length < CONVERGED:
@@ -146,7 +146,7 @@ def _solution(problem: CareProblem, exact: _Exact, X: Decimals) -> CareSolution 
 def _moved(closed: Decimals, side: Decimals, basis: ModalBasis) -> Decimals:
     """Solve ``F^T Y + Y F = -S`` with residuals of many digits: what the inputs hardly reach cancels in B^T Y."""
     solution = side * 0
-    for _ in range(REFINEMENTS):
+    for _ in range(FEW_STATES_REFINEMENTS):
         motion = solution.dot(closed)
         residual = doubles(motion + motion.T + side)
         solution = solution + decimals(basis.solution(basis.components(residual)))
@@ -179,7 +179,7 @@ def _by_sign(problem: CareProblem) -> CareSolution | None:
     if solved is None:
         return None
     step = np.abs(doubles(exact.step_of_gain(solved[0])))
-    if relative_change(step, doubles(gain), problem.R, np.ones(n), NOTHING) > CONVERGED:
+    if relative_change(step, doubles(gain), problem.R, np.ones(n), FEW_STATES_NOTHING) > CONVERGED:
         return None
     X = X + solved[0]
     changes = [

@@ -30,7 +30,7 @@ from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.design.cost import Cost, Weights, checked_weights, given_cost, physical_cost
-from halfdof_ctrl.design.optimal_gain import WARNED, optimal_gain
+from halfdof_ctrl.design.optimal_gain import OPTIMAL_GAIN_WARNED, optimal_gain
 from halfdof_ctrl.design.starts import Solver
 from halfdof_ctrl.model.dense_copy import is_large
 from halfdof_ctrl.model.doors import checked_model
@@ -125,7 +125,7 @@ class StateFeedback:
             lines.append(f"  {name:<{first}}" + "".join(f"{gain:>{width}.4g}" for gain in row))
         poles = ", ".join(complex_in_words(pole, pair=True) for pole in sorted(self.poles, key=abs) if pole.imag >= 0.0)
         lines.append(f"  closed-loop poles: {poles}")
-        if self.gain_error > WARNED:
+        if self.gain_error > OPTIMAL_GAIN_WARNED:
             lines.append(f"  gain known to {self.gain_error:.0e} of its size")
         return "\n".join(lines)
 

@@ -26,13 +26,17 @@ from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 
 UNSEEN = 1e-8  #: imaginary parts, or displacements beside velocities, below this part are not shown
-MARGIN = 4.0  #: times its bound, or N roundings of it: a closed-loop pole nearer to the axis is not told from one on it
-GOOD = 1e-9  #: estimated error with which no other states are tried
+OPTIMAL_GAIN_MARGIN = (
+    4.0  #: times its bound, or N roundings of it: a closed-loop pole nearer to the axis is not told from one on it
+)
+OPTIMAL_GAIN_GOOD = 1e-9  #: estimated error with which no other states are tried
 WORTH = 0.01  #: of the estimated error: other states that leave more are not worth their way back to DOFs
-WARNED = 1e-8  #: estimated error of a gain that is said
+OPTIMAL_GAIN_WARNED = 1e-8  #: estimated error of a gain that is said
 REFUSED = 1e-6  #: error of a gain as the solution of the equation as it is stored, that is too much
-UNKNOWN = 0.1  #: change of a gain by rounding of the entries: of one that solves them, but has no digit that is known
-ONE_THREAD = 600  #: states up to which several threads wait for each other longer than they work
+OPTIMAL_GAIN_UNKNOWN = (
+    0.1  #: change of a gain by rounding of the entries: of one that solves them, but has no digit that is known
+)
+OPTIMAL_GAIN_ONE_THREAD = 600  #: states up to which several threads wait for each other longer than they work
 COORDINATES = 2.0  #: times N roundings: what energy coordinates move a gain, seen on beams of 5 to 80 elements
 
 
@@ -52,10 +56,10 @@ def optimal_gain(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights
     Up to `FEW` states it is the equation of the states of the reduction as they are stored, solved to the last digit;
     beyond these that of the energy, where a model has energy coordinates.
     """
-    one_thread = FEW < reduction.order <= ONE_THREAD
+    one_thread = FEW < reduction.order <= OPTIMAL_GAIN_ONE_THREAD
     with limited_threads(1) if one_thread else nullcontext():
         best = _best_gain(reduction, cost, weights, method)
-    if best.error > WARNED:
+    if best.error > OPTIMAL_GAIN_WARNED:
         msg = (
             f"The gain is known to {best.error:.1e} of its size only: that is what rounding of the entries of A, B, Q "
             "and R does to it. The closed loop is stable; weights nearer to each other give a gain with more digits."
@@ -82,7 +86,7 @@ def _best_gain(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights |
             continue
         if best is None or found.error < WORTH * best.error:
             best = found
-        if few or best.error <= (GOOD if reduction.order <= MORE else WARNED):
+        if few or best.error <= (OPTIMAL_GAIN_GOOD if reduction.order <= MORE else OPTIMAL_GAIN_WARNED):
             break
     if best is None:
         raise refusal if refusal is not None else _unsolved_error(_eigenvalues(reduction.A))
@@ -95,10 +99,10 @@ def _solved_in(plant: Plant, method: Solver) -> OptimalGain:
     if found is None:
         raise _unsolved_error(_eigenvalues(plant.A))
     poles = bounded_poles(found.closed)
-    if not (found.error <= REFUSED and found.of_effort <= UNKNOWN):
+    if not (found.error <= REFUSED and found.of_effort <= OPTIMAL_GAIN_UNKNOWN):
         raise _inaccurate_error(found.error, found.of_effort, poles.values)
     least = np.maximum(poles.bounds, len(poles.values) * UNIT_ROUNDOFF * np.abs(poles.values))
-    if (poles.values.real >= -MARGIN * least).any():
+    if (poles.values.real >= -OPTIMAL_GAIN_MARGIN * least).any():
         raise _unsolved_error(poles.values, float(least[np.argmax(poles.values.real)]))
     K, S, own = found.K, found.X, 0.0
     if plant.T is not None:

@@ -19,8 +19,8 @@ from halfdof_ctrl.design.care_problem import CareProblem
 Solver = Literal["scipy", "slycot"]
 
 GAP = 1e3  #: ratio of neighbouring eigenvalues at which fast and slow parts are told apart
-LARGE = 80  #: states from which on the slowest modes give the start
-SLOWEST = (20, 40)  #: number of them, between which the largest gap is looked for
+STARTS_LARGE = 80  #: states from which on the slowest modes give the start
+STARTS_SLOWEST = (20, 40)  #: number of them, between which the largest gap is looked for
 SHIFTS = tuple(10.0**power for power in range(-14, -1, 2))  #: of |A|, by which a start is made stable
 
 
@@ -34,7 +34,7 @@ def solutions(problem: CareProblem, method: Solver) -> Iterator[FloatArray]:
 
 def starts(problem: CareProblem, method: Solver) -> Iterator[tuple[FloatArray | None, FloatArray]]:
     """Give solutions X with their gains, or None with a gain that stabilizes, for R = 1, the best first."""
-    if len(problem.A) > LARGE:
+    if len(problem.A) > STARTS_LARGE:
         folded = _folded(problem)
         for gain in _gain_of_slowest(folded, method):
             yield None, gain + problem.N.T
@@ -84,8 +84,10 @@ def _gains_of_slow_part(problem: CareProblem, method: Solver) -> Iterator[FloatA
 def _gain_of_slowest(problem: CareProblem, method: Solver) -> Iterator[FloatArray]:
     """Give the gain on the slowest eigenvalues alone."""
     sizes = np.sort(np.abs(scipy.linalg.eigvals(problem.A)))
-    gaps = sizes[SLOWEST[0] : SLOWEST[1]] / np.maximum(sizes[SLOWEST[0] - 1 : SLOWEST[1] - 1], np.finfo(float).tiny)
-    k = SLOWEST[0] + int(np.argmax(gaps))
+    gaps = sizes[STARTS_SLOWEST[0] : STARTS_SLOWEST[1]] / np.maximum(
+        sizes[STARTS_SLOWEST[0] - 1 : STARTS_SLOWEST[1] - 1], np.finfo(float).tiny
+    )
+    k = STARTS_SLOWEST[0] + int(np.argmax(gaps))
     yield from _gain_below(math.sqrt(sizes[k - 1] * sizes[k]), problem, method)
 
 

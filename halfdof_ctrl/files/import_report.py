@@ -20,7 +20,7 @@ from halfdof_ctrl.base.names import listed, removal_of
 from halfdof_ctrl.files.formats.labels import translations
 from halfdof_ctrl.files.formats.raw_matrix import Storage
 
-SYMMETRIC = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
+SYMMETRIC_ENTRIES = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
 PENALTY = 1e35  #: a stiffness from here on is a boundary condition; Abaqus writes 1e36
 WHAT = {"M": "mass", "C": "damping", "K": "stiffness", "S": "structural damping"}
 
@@ -51,7 +51,7 @@ class MatrixReport:
         """Symmetry in words."""
         if self.skew:
             return "skew-symmetric"
-        return "symmetric" if self.asymmetry <= SYMMETRIC else f"unsymmetric ({self.asymmetry:.0e})"
+        return "symmetric" if self.asymmetry <= SYMMETRIC_ENTRIES else f"unsymmetric ({self.asymmetry:.0e})"
 
     @property
     def rank(self) -> str:
@@ -66,7 +66,7 @@ class MatrixReport:
             "file): rigid-body motions, or softer than it tells"
         )
         digits = words if motions else ""
-        part = "" if self.asymmetry <= SYMMETRIC and not self.is_complex else " (of the symmetric real part)"
+        part = "" if self.asymmetry <= SYMMETRIC_ENTRIES and not self.is_complex else " (of the symmetric real part)"
         return self.inertia.in_words + part + ("" if known is None else f", rank {known}") + digits
 
 
@@ -203,7 +203,7 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
         nonzero=int(matrix.nnz),
         is_complex=bool(np.iscomplexobj(matrix.data)),
         asymmetry=float(difference.max()) / scale if difference.nnz else 0.0,
-        skew=bool(difference.nnz) and float(abs(matrix + matrix.T).max()) <= SYMMETRIC * scale,
+        skew=bool(difference.nnz) and float(abs(matrix + matrix.T).max()) <= SYMMETRIC_ENTRIES * scale,
         null_columns=int(np.count_nonzero(~has_entries(matrix))),
         inertia=inertia(real, largest, found.get("known_to", EPS)),
         **found,

@@ -22,11 +22,11 @@ UNITS = {
     "N/m": 1.0, "kN/m": 1e3, "N/mm": 1e3, "MN/m": 1e6, "kN/mm": 1e6,
     "Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "N/mm^2": 1e6, "GPa": 1e9,
 }  #: over N/m or Pa  # fmt: skip
-FREQUENCIES = {"Hz": 2.0 * np.pi, "kHz": 2e3 * np.pi, "rad/s": 1.0}  #: over rad/s
+FREQUENCY_UNITS = {"Hz": 2.0 * np.pi, "kHz": 2e3 * np.pi, "rad/s": 1.0}  #: over rad/s
 ANGLES = {"deg": np.pi / 180.0, "°": np.pi / 180.0, "rad": 1.0}  #: over rad
 RATIOS = {"-": 1.0, "1": 1.0, "%": 0.01}
 ROLES = {
-    "frequency": ({"f", "frequency", "freq", "omega"}, FREQUENCIES),
+    "frequency": ({"f", "frequency", "freq", "omega"}, FREQUENCY_UNITS),
     "storage": ({"k'", "storage", "storage stiffness", "storage modulus", "real", "e'", "g'"}, UNITS),
     "loss": ({"k''", "loss", "loss stiffness", "loss modulus", "imag", "e''", "g''"}, UNITS),
     "modulus": ({"|k|", "|k*|", "modulus", "magnitude", "dynamic stiffness", "stiffness"}, UNITS),
@@ -34,7 +34,7 @@ ROLES = {
     "ratio": ({"loss factor", "tan delta", "eta", "tan d"}, RATIOS),
 }  #: names in small letters, and the units that a column of that kind has
 WAYS = (("storage", "loss"), ("modulus", "angle"), ("modulus", "ratio"), ("storage", "ratio"))
-COLUMN = re.compile(r"^(.*?)\s*(?:\[(.*)\]|\((.*)\))?$")
+STIFFNESS_TABLES_COLUMN = re.compile(r"^(.*?)\s*(?:\[(.*)\]|\((.*)\))?$")
 STIFFNESS, DISPLACEMENT = "stiffness", "displacement"
 
 
@@ -105,7 +105,7 @@ def _complex(columns: dict[str, FloatArray]) -> ComplexArray:
 
 def _role(name: str) -> tuple[str | None, str | None]:
     """Tell what a column is, and its unit."""
-    match = COLUMN.match(name.strip())
+    match = STIFFNESS_TABLES_COLUMN.match(name.strip())
     words = "" if match is None else match.group(1).strip().lower()
     unit = None if match is None else match.group(2) or match.group(3)
     role = next((role for role, (names, _) in ROLES.items() if words in names), None)

@@ -24,7 +24,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 SOUND = 1e-12  #: componentwise backward error of the solutions with K_ss up to which they are believed
 NEARLY_SINGULAR = 1e13  #: growth of a random solution with K_ss, scaled, from which a part floats to within rounding
-SQUARE, COLUMNS, ROWS = ("M", "C"), ("B", "Bv", "Ba"), ("F", "G", "H")
+CONDENSED_SQUARE, CONDENSED_COLUMNS, ROWS = ("M", "C"), ("B", "Bv", "Ba"), ("F", "G", "H")
 
 
 def condensed(model: SecondOrderModel, *, most: int, keep: Collection[str] = ()) -> SecondOrderModel | None:
@@ -63,8 +63,8 @@ def condensed(model: SecondOrderModel, *, most: int, keep: Collection[str] = ())
     if K is None:
         return None
     parts: dict[str, Any] = {"K": read_only(K)}
-    parts |= {letter: _dense(as_sparse(getattr(model, letter))[kept][:, kept]) for letter in SQUARE}
-    parts |= {letter: _dense(as_sparse(getattr(model, letter))[kept]) for letter in COLUMNS}
+    parts |= {letter: _dense(as_sparse(getattr(model, letter))[kept][:, kept]) for letter in CONDENSED_SQUARE}
+    parts |= {letter: _dense(as_sparse(getattr(model, letter))[kept]) for letter in CONDENSED_COLUMNS}
     parts |= {letter: _dense(as_sparse(getattr(model, letter))[:, kept]) for letter in ROWS}
     parts |= {letter: _dense(as_sparse(getattr(model, letter))) for letter in ("D", "Dv", "Da")}
     return replace(model, **parts, dofs=tuple([model.dofs[k] for k in kept.tolist()]))
@@ -74,11 +74,11 @@ def _asked_for(model: SecondOrderModel) -> np.ndarray:
     """Return which DOFs have an entry in M or C, are acted on by an input or seen by an output."""
     n = len(model.dofs)
     asked = np.zeros(n, dtype=bool)
-    for letter in (*SQUARE, *COLUMNS, *ROWS):
+    for letter in (*CONDENSED_SQUARE, *CONDENSED_COLUMNS, *ROWS):
         matrix = as_sparse(getattr(model, letter))
         if letter not in ROWS:
             asked[matrix.indices] = True
-        if letter not in COLUMNS:
+        if letter not in CONDENSED_COLUMNS:
             asked |= np.diff(matrix.indptr) > 0
     return asked
 

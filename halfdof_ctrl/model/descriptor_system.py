@@ -34,7 +34,7 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 #: what rows and columns of the matrices are, by letter
-AXES = {
+DESCRIPTOR_SYSTEM_AXES = {
     "A": ("variables", "variables"),
     "B": ("variables", "inputs"),
     "C": ("outputs", "variables"),
@@ -119,7 +119,9 @@ def dss(
     """
     if has_labels((A, B, C, D, E)):
         names_of_kinds = {"variables": states, "inputs": inputs, "outputs": outputs}
-        matrices, named = without_labels({"A": A, "B": B, "C": C, "D": D, "E": E}, AXES, names_of_kinds)
+        matrices, named = without_labels(
+            {"A": A, "B": B, "C": C, "D": D, "E": E}, DESCRIPTOR_SYSTEM_AXES, names_of_kinds
+        )
         plain: dict[str, Any] = matrices
         return dss(**plain, states=named["variables"], inputs=named["inputs"], outputs=named["outputs"], name=name)
     if A is None:

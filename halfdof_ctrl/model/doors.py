@@ -6,7 +6,7 @@ from halfdof_ctrl.base.doors import wrong_object
 from halfdof_ctrl.model.nonlinear import NonlinearModel
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-REMEDIES = {
+DOORS_REMEDIES = {
     "StateSpace": "A state space has lost M, C and K: pass the model that it was made of, or hd.dss2ss for E x' = A x.",
     "TransferFunction": "It has no M, C and K: make the model by hd.mechss(M, C, K, ...).",
     "FrequencyResponseData": "It has no M, C and K: make the model by hd.mechss(M, C, K, ...).",
@@ -46,7 +46,7 @@ def checked_model(value: object, function: str, *, parameter: str = "model") -> 
     """
     if isinstance(value, SecondOrderModel):
         return value
-    remedy = REMEDIES.get(type(value).__name__, PLAIN_REMEDY)
+    remedy = DOORS_REMEDIES.get(type(value).__name__, PLAIN_REMEDY)
     raise wrong_object(function, "a model of mechss", value, remedy, parameter=parameter)
 
 
@@ -59,8 +59,8 @@ def require_matrix(value: object, function: str, *, parameter: str) -> None:
         It is one of these.
     """
     is_path = isinstance(value, str | os.PathLike)
-    if is_path or type(value).__name__ in REMEDIES:
-        remedy = "Load a file by hd.load_model(path)." if is_path else REMEDIES[type(value).__name__]
+    if is_path or type(value).__name__ in DOORS_REMEDIES:
+        remedy = "Load a file by hd.load_model(path)." if is_path else DOORS_REMEDIES[type(value).__name__]
         raise wrong_object(function, "a model of mechss, or matrices", value, remedy, parameter=parameter)
 
 

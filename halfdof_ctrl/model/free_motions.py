@@ -18,11 +18,11 @@ from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, ModelMatrix, a
 from halfdof_ctrl.base.matrix_residual import exact_product
 
 NEXT_MOTION = 1e3  #: the ratio of the softest motion that is not free is larger by this factor
-SMALL = 1e-7  #: of the largest eigenvalue at unit diagonal: of motions above ...
-BESIDE = 3  #: ... only so many are looked at
+FREE_MOTIONS_SMALL = 1e-7  #: of the largest eigenvalue at unit diagonal: of motions above ...
+FREE_MOTIONS_BESIDE = 3  #: ... only so many are looked at
 BALANCED = 16.0  #: times the rounding of the entries: a power of dampers that cancels to this part is none
 IMPROVEMENTS = 2
-LARGEST = 500  #: DOFs up to which free motions are counted for `repr`
+FREE_MOTIONS_LARGEST = 500  #: DOFs up to which free motions are counted for `repr`
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def free_motion_count(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, rounding: 
     size = np.diagonal(stiffness)
     scale = np.where(size > 0.0, powers_of_two(np.sqrt(np.abs(size))), 1.0)
     scaled = scale[:, None] * stiffness * scale
-    if not _has_soft_motions(scaled, max(SMALL, rounding)):
+    if not _has_soft_motions(scaled, max(FREE_MOTIONS_SMALL, rounding)):
         return None
     values, vectors = np.linalg.eigh(scaled)
     free = _free(scaled, values, vectors, rounding)
@@ -109,8 +109,8 @@ def _symmetric_parts(
 def _free(K: FloatArray, values: FloatArray, vectors: FloatArray, rounding: float) -> IndexArray:
     """Return which of the eigenvectors are free motions; none where that is not told from soft ones."""
     largest = max(float(values[-1]), 0.0)
-    few = int(np.count_nonzero(values <= max(SMALL, rounding) * largest))
-    ratios = _ratios(K, vectors[:, : few + BESIDE])
+    few = int(np.count_nonzero(values <= max(FREE_MOTIONS_SMALL, rounding) * largest))
+    ratios = _ratios(K, vectors[:, : few + FREE_MOTIONS_BESIDE])
     free = np.flatnonzero(np.abs(ratios) <= rounding)
     others = np.delete(ratios, free)
     next_one = NEXT_MOTION * max(float(np.abs(ratios[free]).max(initial=0.0)), EPS)

@@ -17,12 +17,12 @@ from typing import Any
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
 from halfdof_ctrl.model.law import Law
-from halfdof_ctrl.model.laws import BUILT_IN, as_typed
+from halfdof_ctrl.model.laws import BUILT_IN_LAWS, as_typed
 
-KINDS: dict[str, type[Spring | Damper]] = {"spring": Spring, "damper": Damper}
+ELEMENT_KINDS: dict[str, type[Spring | Damper]] = {"spring": Spring, "damper": Damper}
 CALL = re.compile(r"\s*([A-Za-z_]\w*)\s*\((.*)\)\s*", re.DOTALL)
 ELEMENT = re.compile(r"\s*(\w+)\s+(.+?)\s+([A-Za-z_]\w*\s*\(.*\)|[-+.\w]+)\s*", re.DOTALL)
-PARTS = 4  #: of a stored element: kind, a, b, law
+LAW_PARTS = 4  #: of a stored element: kind, a, b, law
 MOST_ENDS = 2  #: DOFs of an element
 
 
@@ -43,8 +43,8 @@ def law_from_text(text: str) -> Law | float:
     if call is None:
         return _number(text, text)
     name, inside = call.groups()
-    if name not in BUILT_IN:
-        msg = f"There is no law {name!r}. Known: {', '.join(BUILT_IN)}."
+    if name not in BUILT_IN_LAWS:
+        msg = f"There is no law {name!r}. Known: {', '.join(BUILT_IN_LAWS)}."
         raise ParameterError(msg, parameter="law", value=text)
     given: list[Any] = []
     named: dict[str, Any] = {}
@@ -55,13 +55,13 @@ def law_from_text(text: str) -> Law | float:
         else:
             given.append(_value(part, text))
     try:
-        inspect.signature(BUILT_IN[name]).bind(*given, **named)
+        inspect.signature(BUILT_IN_LAWS[name]).bind(*given, **named)
     except TypeError as cause:
-        msg = f"{text}: {cause}. It is {name}{inspect.signature(BUILT_IN[name])}.".replace(
+        msg = f"{text}: {cause}. It is {name}{inspect.signature(BUILT_IN_LAWS[name])}.".replace(
             " -> halfdof_ctrl.model.law.Law", ""
         )
         raise ParameterError(msg, parameter="law", value=text) from cause
-    return BUILT_IN[name](*given, **named)
+    return BUILT_IN_LAWS[name](*given, **named)
 
 
 def element_from_text(text: str) -> Spring | Damper:
@@ -81,11 +81,13 @@ def element_from_text(text: str) -> Spring | Damper:
     """
     found = ELEMENT.fullmatch(text)
     ends = _ends(found.group(2)) if found else []
-    if found is None or found.group(1) not in KINDS or not 1 <= len(ends) <= MOST_ENDS:
+    if found is None or found.group(1) not in ELEMENT_KINDS or not 1 <= len(ends) <= MOST_ENDS:
         usual = '"spring" or "damper", one or two DOFs and a law, as in "damper y2 quadratic(1e4,30)"'
         msg = f"An element is {usual}, not {text!r}."
         raise ParameterError(msg, parameter="element", value=text)
-    return KINDS[found.group(1)](ends[0], ends[1] if len(ends) == MOST_ENDS else None, law_from_text(found.group(3)))
+    return ELEMENT_KINDS[found.group(1)](
+        ends[0], ends[1] if len(ends) == MOST_ENDS else None, law_from_text(found.group(3))
+    )
 
 
 def stored_elements(elements: Sequence[Element]) -> tuple[str, ...]:
@@ -128,10 +130,15 @@ def elements_from_stored(texts: Sequence[str]) -> tuple[Spring | Damper, ...]:
             parts = json.loads(text)
         except ValueError:
             parts = None
-        if not (isinstance(parts, list) and len(parts) == PARTS and parts[0] in KINDS and isinstance(parts[3], str)):
+        if not (
+            isinstance(parts, list)
+            and len(parts) == LAW_PARTS
+            and parts[0] in ELEMENT_KINDS
+            and isinstance(parts[3], str)
+        ):
             msg = f"elements holds {text!r}, which is no element of this package."
             raise ParameterError(msg, parameter="elements", value=text)
-        elements.append(KINDS[parts[0]](parts[1], parts[2], law_from_text(parts[3])))
+        elements.append(ELEMENT_KINDS[parts[0]](parts[1], parts[2], law_from_text(parts[3])))
     return tuple(elements)
 
 
@@ -168,7 +175,6 @@ def _number(text: str, whole: str) -> float:
     try:
         return float(text)
     except ValueError as cause:
-        msg = (
-            f"{whole!r}: {text.strip()!r} is no number. A law is a number or one of {', '.join(BUILT_IN)} with numbers."
-        )
+        laws = ", ".join(BUILT_IN_LAWS)
+        msg = f"{whole!r}: {text.strip()!r} is no number. A law is a number or one of {laws} with numbers."
         raise ParameterError(msg, parameter="law", value=whole) from cause

@@ -45,7 +45,7 @@ from halfdof_ctrl.model.measured_curve import MeasuredCurve
 
 __all__ = ["bilinear", "coulomb", "cubic", "gap", "power", "quadratic", "table"]
 
-LARGE = 1e4  #: numbers from here on that end in zeros print as 1e4
+LARGE_EXPONENT = 1e4  #: numbers from here on that end in zeros print as 1e4
 
 
 def quadratic(c2: float, c1: float = 0.0) -> Law:
@@ -315,7 +315,7 @@ def table(x: npt.ArrayLike, f: npt.ArrayLike, extend: Literal["linear"] | None =
     )
 
 
-BUILT_IN: dict[str, Callable[..., Law]] = {
+BUILT_IN_LAWS: dict[str, Callable[..., Law]] = {
     law.__name__: law for law in (quadratic, power, cubic, bilinear, gap, coulomb, table)
 }  #: what the name in a file or on a command line stands for
 
@@ -332,7 +332,7 @@ def as_typed(value: float) -> str:
         short = f"{number:.15e}"
         mantissa, _, exponent = short.partition("e")
         short = f"{mantissa.rstrip('0').rstrip('.')}e{int(exponent)}"
-        return short if abs(number) >= LARGE and len(short) < len(plain) and float(short) == number else plain
+        return short if abs(number) >= LARGE_EXPONENT and len(short) < len(plain) and float(short) == number else plain
     mantissa, _, exponent = repr(number).partition("e")
     return f"{mantissa}e{int(exponent)}" if exponent else mantissa
 

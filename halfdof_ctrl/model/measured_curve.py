@@ -14,7 +14,7 @@ from halfdof_ctrl.base.arrays import FloatArray, read_only
 from halfdof_ctrl.base.doors import is_choice, real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 
-FEWEST = 2  #: points that make a curve
+FEWEST_CURVE_POINTS = 2  #: points that make a curve
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -78,9 +78,10 @@ def _checked(x: npt.ArrayLike, f: npt.ArrayLike, extend: object) -> tuple[FloatA
         raise ParameterError(msg, parameter="extend", value=extend)
     points = np.array(real_numbers(x, "table: x", "real numbers"))
     values = np.array(real_numbers(f, "table: f", "real numbers"))
-    if points.ndim != 1 or points.shape != values.shape or points.size < FEWEST:
+    if points.ndim != 1 or points.shape != values.shape or points.size < FEWEST_CURVE_POINTS:
         shapes = f"{points.shape} and {values.shape}"
-        msg = f"table: x and f must be two rows of the same {FEWEST} or more numbers, not of shapes {shapes}."
+        fewest = FEWEST_CURVE_POINTS
+        msg = f"table: x and f must be two rows of the same {fewest} or more numbers, not of shapes {shapes}."
         raise ParameterError(msg, parameter="table", value=points.shape)
     if not (np.isfinite(points).all() and np.isfinite(values).all() and (np.diff(points) > 0.0).all()):
         msg = (

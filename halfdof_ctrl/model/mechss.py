@@ -43,7 +43,7 @@ from halfdof_ctrl.base.sparse_arrays import (
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 #: what rows and columns of the matrices are, by letter
-AXES = (
+MECHSS_AXES = (
     dict.fromkeys(("M", "C", "K"), ("DOFs", "DOFs"))
     | dict.fromkeys(("B", "Bv", "Ba"), ("DOFs", "inputs"))
     | dict.fromkeys(("F", "G", "H"), ("outputs", "DOFs"))
@@ -121,12 +121,13 @@ def mechss(
       dofs:    mass, joint
       inputs:  F_mass, F_joint
       outputs: mass, joint
+      1 free motion: 1 pole at exactly 0, so that the response at rest is infinite
     """
     require_text(name, "name")
     given = (M, C, K, B, Bv, Ba, F, G, H, D, Dv, Da)
     if has_labels(given):
         names_of_kinds = {"DOFs": dofs, "inputs": inputs, "outputs": outputs}
-        matrices, named = without_labels(dict(zip(AXES, given, strict=True)), AXES, names_of_kinds)
+        matrices, named = without_labels(dict(zip(MECHSS_AXES, given, strict=True)), MECHSS_AXES, names_of_kinds)
         plain: dict[str, Any] = matrices
         return mechss(**plain, dofs=named["DOFs"], inputs=named["inputs"], outputs=named["outputs"], name=name)
     M, C, K = (checked_sparse_squares if has_sparse((M, C, K)) else checked_square_matrices)((M, C, K), "MCK")

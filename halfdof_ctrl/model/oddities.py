@@ -13,11 +13,13 @@ from halfdof_ctrl.base.arrays import EPS, ModelMatrix
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
 
-UNSYMMETRIC = 64 * EPS  #: of the larger of two entries across the diagonal, or what the digits of a file leave unknown
+ODDITIES_UNSYMMETRIC = (
+    64 * EPS
+)  #: of the larger of two entries across the diagonal, or what the digits of a file leave unknown
 DENSE_EIGENVALUES = 150  #: DOFs up to which all eigenvalues are asked for their sign
 NEGATIVE = 1e-12  #: of the matrix with unit diagonal, an eigenvalue that is not rounding
 MOST_ENTRIES = 500_000  #: above which the diagonal alone is looked at
-FEW = 4  #: DOFs that are named
+ODDITIES_FEW = 4  #: DOFs that are named
 
 
 def oddities(matrices: dict[str, ModelMatrix], dofs: tuple[str, ...], known_to: float = EPS) -> list[str]:
@@ -48,13 +50,13 @@ def _of_matrix(matrix: csc_array, dofs: tuple[str, ...], known_to: float) -> str
     diagonal = matrix.diagonal()
     negative = np.flatnonzero(diagonal < 0.0)
     if negative.size:
-        return f"negative on the diagonal at {listed([dofs[k] for k in negative.tolist()], FEW)}"
+        return f"negative on the diagonal at {listed([dofs[k] for k in negative.tolist()], ODDITIES_FEW)}"
     if matrix.nnz > MOST_ENTRIES:
         return None
     upper, lower = triu(matrix, 1, format="csc"), triu(matrix.T, 1, format="csc")
     difference: Any = abs(upper - lower).tocoo()
     size: Any = abs(upper).maximum(abs(lower))
-    excess = (difference - max(UNSYMMETRIC, 2.0 * known_to) * size).tocoo()
+    excess = (difference - max(ODDITIES_UNSYMMETRIC, 2.0 * known_to) * size).tocoo()
     wrong = np.flatnonzero(excess.data > 0.0)
     if wrong.size:
         first = wrong[np.argmax(excess.data[wrong])]
@@ -78,5 +80,5 @@ def _by_eigenvalues(matrix: csc_array, diagonal: np.ndarray, dofs: tuple[str, ..
     values, vectors = np.linalg.eigh((scaled + scaled.T) / 2.0)
     if values[0] >= -max(NEGATIVE, 2.0 * known_to * np.abs(scaled).sum(axis=0).max()):
         return None
-    most = there[np.argsort(-np.abs(vectors[:, 0]), kind="stable")[:FEW]]
-    return f"indefinite in a motion of {listed([dofs[k] for k in sorted(most.tolist())], FEW)}"
+    most = there[np.argsort(-np.abs(vectors[:, 0]), kind="stable")[:ODDITIES_FEW]]
+    return f"indefinite in a motion of {listed([dofs[k] for k in sorted(most.tolist())], ODDITIES_FEW)}"

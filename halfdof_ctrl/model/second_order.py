@@ -28,7 +28,7 @@ from halfdof_ctrl.base.sparse_arrays import (
 )
 from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
 from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer, squeezed
-from halfdof_ctrl.model.free_motions import LARGEST, free_motion_count
+from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 from halfdof_ctrl.model.oddities import oddities
@@ -284,7 +284,7 @@ class SecondOrderModel:
         complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
         prescribed_part = f"\n  motion prescribed: {listed(self.prescribed)}" if self.prescribed else ""
         free_part = ""
-        if len(self.dofs) <= LARGEST:
+        if len(self.dofs) <= FREE_MOTIONS_LARGEST:
             free = free_motion_count(self.M, self.C, self.K, self.known_to)
             free_part = f"\n  {free.in_words()}" if free else ""
         rounded_part = f"\n  entries known to {self.known_to:.0e}" if self.known_to > EPS else ""

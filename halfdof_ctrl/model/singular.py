@@ -50,7 +50,7 @@ NULL_VECTOR_SHARE = 1e-6  #: what has more than this share of a null vector in e
 Group: TypeAlias = frozenset[int]
 SINGLE: tuple[Kind, ...] = ("unattached", "unused", "empty")
 WITH_THEIR_EQUATIONS: tuple[Kind, ...] = ("unattached", "floating", "redundant")
-PAIR = 2
+PAIR_OF_DOFS = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,7 +155,7 @@ def _kind_of_equations(group: Group, coefficients: Sequence[DenseMatrix]) -> Kin
     if len(members) == 1:
         return "empty"
     rows = np.hstack([matrix[members] for matrix in coefficients])
-    return "identical" if len(members) == PAIR and _is_constant(rows.T) else "dependent"
+    return "identical" if len(members) == PAIR_OF_DOFS and _is_constant(rows.T) else "dependent"
 
 
 def _is_constant(columns: DenseMatrix) -> bool:

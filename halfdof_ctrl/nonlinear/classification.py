@@ -22,7 +22,7 @@ from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns
 
-SEEDS = (20, 21)  #: of the two draws of generic tangents
+POINT_SEEDS = (20, 21)  #: of the two draws of generic tangents
 MOVING = 1e-12  #: a variable whose part on T_c or T_k is below this share of its largest is a state's
 
 
@@ -60,7 +60,7 @@ def require_index_one(base: SecondOrderModel, geometry: Geometry) -> list[FloatA
     SingularPencilError
         Nothing resists a motion whatever the slopes are.
     """
-    draws = [generic_slopes(base, geometry, seed) for seed in SEEDS]
+    draws = [generic_slopes(base, geometry, seed) for seed in POINT_SEEDS]
     found = [partition_of(geometry.with_slopes(base, slopes)) for slopes in draws]
     if found[0] is None or found[1] is None:
         raise _index_error(base, geometry, draws[0])

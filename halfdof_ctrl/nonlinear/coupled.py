@@ -24,14 +24,14 @@ from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.nonlinear.geometry import Geometry, Place
 from halfdof_ctrl.nonlinear.scalar_equation import root_of
 
-SYMMETRIC = 1e-11  #: relative difference of S and its transpose that is rounding
+SYMMETRIC_TANGENT = 1e-11  #: relative difference of S and its transpose that is rounding
 RANK = 1e-12  #: singular values of S below this part of the largest are none
 MOST_COUPLED_STEPS = 100  #: of Newton
 MOST_COUPLED_HALVINGS = 60  #: along one step
 MOST_TURNS = 400  #: through all variables, one by one
 LOOSE = 1e3 * EPS  #: of its terms: a gradient that Newton does not make smaller than this is rounding
 SETTLED_FORCE = 8 * EPS  #: relative change of w that is none
-SHIFTS = (0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-2, 1.0)  #: of the Hessian, in units of its linear part
+JACOBIAN_SHIFTS = (0.0, 1e-14, 1e-11, 1e-8, 1e-5, 1e-2, 1.0)  #: of the Hessian, in units of its linear part
 STEEPEST = 1e200  #: stands for an infinite slope
 
 Solver = Callable[[float, FloatArray], tuple[FloatArray, FloatArray] | None]
@@ -60,7 +60,10 @@ class Group:
     def is_convex(self) -> bool:
         """Whether all are springs or dampers and S is symmetric positive semidefinite, so that h is convex."""
         size = float(np.abs(self.S).max())
-        if not all(place.is_scalar for place in self.places) or np.abs(self.S - self.S.T).max() > SYMMETRIC * size:
+        if (
+            not all(place.is_scalar for place in self.places)
+            or np.abs(self.S - self.S.T).max() > SYMMETRIC_TANGENT * size
+        ):
             return False
         return bool(np.linalg.eigvalsh(0.5 * (self.S + self.S.T)).min() > -RANK * size)
 
@@ -162,7 +165,7 @@ def _is_flat(one: FloatArray, two: FloatArray, share: float) -> bool:
 
 def _newton_step(hessian: FloatArray, down: FloatArray, s: FloatArray) -> FloatArray | None:
     """Return a step down; where a slope is zero and the Hessian singular, a shorter one along what is left of it."""
-    for shift in SHIFTS:
+    for shift in JACOBIAN_SHIFTS:
         try:
             step = -np.linalg.solve(hessian + np.diag(shift / s) if shift else hessian, down)
         except np.linalg.LinAlgError:

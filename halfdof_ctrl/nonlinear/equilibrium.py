@@ -13,7 +13,7 @@ from halfdof_ctrl.base.errors import LawError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import Values
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.nonlinear.classification import SEEDS, generic_slopes
+from halfdof_ctrl.nonlinear.classification import POINT_SEEDS, generic_slopes
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def equilibrium_of(reduction: "NonlinearReduction", inputs: Values) -> Equilibri
 
 def _help(reduction: "NonlinearReduction", base: SecondOrderModel) -> FloatArray:
     """Return a stiffness in the place of every element, of the size of what else is there."""
-    slopes = [np.abs(G) for G in generic_slopes(base, reduction.geometry, SEEDS[0])]
+    slopes = [np.abs(G) for G in generic_slopes(base, reduction.geometry, POINT_SEEDS[0])]
     return np.asarray(reduction.geometry.with_slopes(base, slopes).K - base.K)
 
 

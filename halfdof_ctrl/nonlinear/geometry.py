@@ -21,7 +21,7 @@ from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.judgement import judged
 
-STEP = float(np.cbrt(np.finfo(float).eps))  #: relative step of a jacobian that is differenced ...
+DIFFERENCE_STEP = float(np.cbrt(np.finfo(float).eps))  #: relative step of a jacobian that is differenced ...
 LEAST_STEP = 1e-9  #: ... and the absolute one at a value of zero
 
 
@@ -59,7 +59,7 @@ class Place:
             return np.hstack([np.asarray(by_q, dtype=float), np.asarray(by_v, dtype=float)])
         columns = []
         for j, value in enumerate(w.tolist()):
-            step = max(STEP * abs(value), LEAST_STEP)
+            step = max(DIFFERENCE_STEP * abs(value), LEAST_STEP)
             above, below = w.copy(), w.copy()
             above[j], below[j] = value + step, value - step
             columns.append((self.force(above, t) - self.force(below, t)) / (above[j] - below[j]))

@@ -11,7 +11,7 @@ import numpy as np
 
 from halfdof_ctrl.model.law import Law
 
-FAR = (1e100, 1e150)  #: where a law is asked whether it still grows
+FAR_POINTS = (1e100, 1e150)  #: where a law is asked whether it still grows
 STILL = 1e-6  #: relative growth between these two that is none
 GRID = np.concatenate([-np.geomspace(1e12, 1e-9, 253), [0.0], np.geomspace(1e-9, 1e12, 253)])  #: values that are tried
 FORCE_ROUNDING = 64 * np.finfo(float).eps  #: a fall by this part of the force is rounding
@@ -78,7 +78,7 @@ def _reach(law: Law) -> tuple[float, float]:
     """Find the forces that a law approaches far out."""
     ends = []
     for sign in (-1.0, 1.0):
-        near, far = (_value(law, sign * at) for at in FAR)
+        near, far = (_value(law, sign * at) for at in FAR_POINTS)
         grows = not np.isfinite(far) or not np.isfinite(near) or abs(far - near) > STILL * max(abs(far), abs(near))
         ends.append(sign * np.inf if grows else float(far))
     return (ends[0], ends[1]) if ends[0] < ends[1] else (-np.inf, np.inf)

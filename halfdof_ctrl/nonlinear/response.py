@@ -38,9 +38,9 @@ from halfdof_ctrl.nonlinear.system import require_proper
 
 Method: TypeAlias = Literal["LSODA", "BDF", "Radau", "RK45", "RK23", "DOP853"]
 
-METHODS = ("LSODA", "BDF", "Radau", "RK45", "RK23", "DOP853")
-COARSE = 1e-3  #: relative tolerance of the run that measures the sizes
-SAFETY = 0.03  #: of rtol is what each step may err; over a run errors add up (measured: to 150 times a step's)
+SOLVER_METHODS = ("LSODA", "BDF", "Radau", "RK45", "RK23", "DOP853")
+COARSE_TOLERANCE = 1e-3  #: relative tolerance of the run that measures the sizes
+STEP_SAFETY = 0.03  #: of rtol is what each step may err; over a run errors add up (measured: to 150 times a step's)
 LEAST_STEP_TOLERANCE = 1e-13  #: relative; solvers refuse less
 BAR_STEPS = 1000  #: of the progress bar
 FEWEST_RUN_STEPS = 50  #: in a run whose inputs are functions, which may move between the times asked for
@@ -108,7 +108,7 @@ def nonlinear_response(
     _require_valid(rtol, method)
     forcing = read_inputs(inputs, nonlinear.inputs, times)
     x_0 = initial_state(reduction, initial, forcing.at(float(times[0])), float(times[0]))
-    step = max(SAFETY * rtol, LEAST_STEP_TOLERANCE)
+    step = max(STEP_SAFETY * rtol, LEAST_STEP_TOLERANCE)
     tolerances = step * _sizes(reduction, forcing, times, x_0, method)
     run = _Run.of(reduction, forcing, times, tolerances)
     states, reached = run.integrate(x_0, step, tolerances, method, show=None)
@@ -214,9 +214,9 @@ def _sizes(
     if x_0.size == 0 or times.size == 1:
         return _filled(np.abs(x_0), reduction)
     guess = _filled(np.maximum(np.abs(x_0), _reach(reduction, forcing, times, x_0)), reduction)
-    tolerances = COARSE * COARSE * guess
-    run = _Run.of(reduction, forcing, times, COARSE * guess)
-    states, done = run.integrate(x_0, COARSE, tolerances, method, show=False)
+    tolerances = COARSE_TOLERANCE * COARSE_TOLERANCE * guess
+    run = _Run.of(reduction, forcing, times, COARSE_TOLERANCE * guess)
+    states, done = run.integrate(x_0, COARSE_TOLERANCE, tolerances, method, show=False)
     if done < times.size:  # stopped by the user before anything was done that could be kept
         raise KeyboardInterrupt
     return _filled(np.maximum(np.abs(states[:, :done]).max(axis=1), np.abs(x_0)), reduction)
@@ -277,8 +277,8 @@ def _checked_times(timepts: npt.ArrayLike) -> FloatArray:
 
 
 def _require_valid(rtol: float, method: str) -> None:
-    if not is_choice(method, METHODS):
-        msg = f"method must be one of {', '.join(METHODS)}, not {shown(method)}."
+    if not is_choice(method, SOLVER_METHODS):
+        msg = f"method must be one of {', '.join(SOLVER_METHODS)}, not {shown(method)}."
         raise ParameterError(msg, parameter="method", value=method)
     if not (isinstance(rtol, int | float) and LEAST_STEP_TOLERANCE <= rtol < 1.0):
         msg = f"rtol = {shown(rtol)}, but a relative tolerance lies between 1e-13, near rounding, and 1."

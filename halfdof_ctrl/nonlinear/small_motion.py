@@ -16,7 +16,7 @@ from halfdof_ctrl.base.names import listed
 if TYPE_CHECKING:
     from halfdof_ctrl.nonlinear.reduction import NonlinearReduction
 
-STEEPEST = 1e150  #: stands for an infinite slope, whose inverse is flat
+STEEPEST_TANGENT = 1e150  #: stands for an infinite slope, whose inverse is flat
 SINGULAR_GROUP = 1e-13  #: reciprocal condition of 1 + S D in a group, below which it is singular
 
 
@@ -47,7 +47,7 @@ def feedback_of_elements(
     for place, slope, moves in zip(geometry.places, slopes, reduction.moving, strict=True):
         if np.isnan(slope).any() or (np.isinf(slope).any() and not moves):
             raise infinite_slope(place.words, place.dofs, "its slope there is infinite")
-    D = np.clip(geometry.joined(slopes), -STEEPEST, STEEPEST) - reduction.G
+    D = np.clip(geometry.joined(slopes), -STEEPEST_TANGENT, STEEPEST_TANGENT) - reduction.G
     P = np.eye(w.size) + reduction.S @ D
     for k, rest in reduction.rests.items():  # 1 - S G loses all digits where the element alone holds the DOF
         place = geometry.places[k]
@@ -58,7 +58,7 @@ def feedback_of_elements(
                 raise infinite_slope(
                     place.words, place.dofs, "its slope there is zero, so that of its inverse is infinite"
                 )
-            P[row, row] = 1.0 / STEEPEST
+            P[row, row] = 1.0 / STEEPEST_TANGENT
     size = np.abs(P).max(axis=1, keepdims=True)  # rows of steep elements are large
     if np.linalg.cond(P / size) * SINGULAR_GROUP > 1.0 and not reduction.rests:
         places = [place for place, moves in zip(geometry.places, reduction.moving, strict=True) if moves]

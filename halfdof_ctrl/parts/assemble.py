@@ -30,7 +30,7 @@ from halfdof_ctrl.parts.part_signals import assembled_signals
 from halfdof_ctrl.parts.points import Points, block_diagonal, points_of
 from halfdof_ctrl.parts.ties import Row, Ties
 
-LETTERS = ("M", "C", "K")
+SQUARE_LETTERS = ("M", "C", "K")
 
 
 @overload
@@ -203,7 +203,7 @@ def _joined(
 ) -> SecondOrderModel:
     T, kept = substitution
     models = list(parts.values())
-    M, C, K = (block_diagonal([getattr(model, letter) for model in models]) for letter in LETTERS)
+    M, C, K = (block_diagonal([getattr(model, letter) for model in models]) for letter in SQUARE_LETTERS)
     K = csc_array(K + _of_elements([each for each in elements if isinstance(each, Spring)], points, ties))
     C = csc_array(C + _of_elements([each for each in elements if isinstance(each, Damper)], points, ties))
     squares = [csc_array(T.T @ X @ T) for X in (M, C, K)]
@@ -222,7 +222,7 @@ def _joined(
     wide = csc_array(joined_sparse([[T, sparse_zeros(T.shape[0], count)]]))
     signals = assembled_signals(parts, wide, tuple(names), len(kept))
     dense = not any(model.is_sparse for model in models)
-    matrices: dict[str, Any] = dict(zip(LETTERS, squares, strict=True)) | signals
+    matrices: dict[str, Any] = dict(zip(SQUARE_LETTERS, squares, strict=True)) | signals
     if dense:
         matrices = {key: value.toarray() if hasattr(value, "toarray") else value for key, value in matrices.items()}
     return replace(mechss(**matrices, name=name), known_to=max([model.known_to for model in models]))

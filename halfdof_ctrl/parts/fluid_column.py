@@ -20,7 +20,7 @@ from halfdof_ctrl.parts.links import Link, linked
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve
 from halfdof_ctrl.parts.prony_series import Series, best_sizes
 
-FREQUENCIES = 30  #: that are scanned, over the band
+CHECKED_FREQUENCIES = 30  #: that are scanned, over the band
 DAMPINGS = np.geomspace(0.02, 1.0, 7)  #: ratios that are scanned
 PER_DECADE = 4  #: rates of the rubber beside the fluid: few, so that they do not do the fluid's work
 
@@ -66,7 +66,7 @@ class FluidColumn:
 def fluid_column(curve: MeasuredCurve) -> FluidColumn | None:
     """Find the column of fluid that explains most of a curve; None where none helps."""
     w = np.geomspace(curve.omega[0] / 3.0, 3.0 * curve.omega[-1], _count(curve))
-    grid = [(f, zeta) for f in np.geomspace(curve.omega[0], curve.omega[-1], FREQUENCIES) for zeta in DAMPINGS]
+    grid = [(f, zeta) for f in np.geomspace(curve.omega[0], curve.omega[-1], CHECKED_FREQUENCIES) for zeta in DAMPINGS]
     costs = [_fitted(curve, w, f, zeta)[0].cost for f, zeta in grid]
     first = np.log(grid[int(np.argmin(costs))])
 

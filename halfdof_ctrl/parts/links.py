@@ -24,7 +24,7 @@ from halfdof_ctrl.base.names import as_tuple, listed
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-AXES = ("x", "y", "z", "rx", "ry", "rz")  #: three displacements and the small rotations about them
+LINKS_AXES = ("x", "y", "z", "rx", "ry", "rz")  #: three displacements and the small rotations about them
 
 Axes: TypeAlias = str | Sequence[str] | None
 Size: TypeAlias = float | Mapping[str, float]  #: of a spring or damper: the same along all axes, or one for each
@@ -60,9 +60,11 @@ def part_axes(axes: Axes, **sizes: object) -> tuple[str, ...]:
     """
     by_axis = {symbol: tuple(value) for symbol, value in sizes.items() if isinstance(value, Mapping)}
     found = next(iter(by_axis.values()), ("",)) if axes is None else _split(axes)
-    wrong = [axis for axis in found if axis not in AXES and found != ("",)]
+    wrong = [axis for axis in found if axis not in LINKS_AXES and found != ("",)]
     if wrong or not found or len(set(found)) != len(found):
-        msg = f"axes = {axes if axes is not None else found!r}: each must be one of {listed(AXES)}, and stand once."
+        msg = (
+            f"axes = {axes if axes is not None else found!r}: each must be one of {listed(LINKS_AXES)}, and stand once."
+        )
         raise ParameterError(msg, parameter="axes", value=axes)
     for symbol, keys in by_axis.items():
         if set(keys) != set(found):
@@ -147,5 +149,5 @@ def axis_name(node: str, axis: str) -> str:
 
 def _split(axes: str | Sequence[str]) -> tuple[str, ...]:
     if isinstance(axes, str):
-        return (axes,) if axes in AXES else tuple(axes)
+        return (axes,) if axes in LINKS_AXES else tuple(axes)
     return as_tuple(axes)

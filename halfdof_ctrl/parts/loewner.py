@@ -18,15 +18,15 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve
 
-FEWEST = 2  #: points of either set
-REAL = 0.3  #: of its size: the imaginary part of a pole that may be real but for rounding
-EXTRA = 2  #: ranks beyond the branches, for the stiffness when fast and the damper
+FEWEST_ORDERS = 2  #: points of either set
+REAL_SHARE = 0.3  #: of its size: the imaginary part of a pole that may be real but for rounding
+EXTRA_ORDERS = 2  #: ranks beyond the branches, for the stiffness when fast and the damper
 
 
 def rational_rates(curve: MeasuredCurve, most: int) -> Iterator[FloatArray]:
     """Give the rates of rational functions of rising order, those that a passive series can have."""
     s, K = 1j * curve.omega, curve.values
-    if s.size < 2 * FEWEST:
+    if s.size < 2 * FEWEST_ORDERS:
         return
     mu, v = (np.concatenate([part[::2], part[::2].conj()]) for part in (s, K))
     sigma, u = (np.concatenate([part[1::2], part[1::2].conj()]) for part in (s, K))
@@ -36,11 +36,11 @@ def rational_rates(curve: MeasuredCurve, most: int) -> Iterator[FloatArray]:
     second = ((mu * v)[:, None] - sigma * u) / gap * scale
     left = scipy.linalg.svd(np.hstack([first, second]))[0]
     right = scipy.linalg.svd(np.vstack([first, second]))[2].conj().T
-    for rank in range(1, min(*first.shape, most + EXTRA) + 1):
+    for rank in range(1, min(*first.shape, most + EXTRA_ORDERS) + 1):
         Y, X = left[:, :rank].conj().T, right[:, :rank]
         with np.errstate(divide="ignore", invalid="ignore"):
             poles = np.asarray(scipy.linalg.eigvals(Y @ second @ X, Y @ first @ X), dtype=np.complex128)
         rates = -poles.real
-        sound = np.isfinite(poles) & (rates > 0.0) & (np.abs(poles.imag) < REAL * np.abs(rates))
+        sound = np.isfinite(poles) & (rates > 0.0) & (np.abs(poles.imag) < REAL_SHARE * np.abs(rates))
         if sound.any():
             yield np.sort(rates[sound])

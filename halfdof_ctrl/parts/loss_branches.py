@@ -18,7 +18,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import ParameterError
 
 MOST_BRANCHES = 12
-PER_DECADE = 400  #: frequencies at which errors are measured
+POINTS_PER_DECADE = 400  #: frequencies at which errors are measured
 PER_DECADE_FITTED = 60  #: frequencies at which branches are refined
 LAWSON_ROUNDS = 12  #: of reweighting towards the largest error (C. L. Lawson, 1961)
 SMALLEST_WEIGHT = 1e-3  #: over the mean, so that no frequency is forgotten
@@ -58,7 +58,7 @@ def constant_loss(count: int, band: tuple[float, float]) -> Branches:
     sine, cosine, _, _ = ellipj(places, 1.0 - ratio)
     c = (sine / cosine) ** 2
     odd, even = c[0::2], c[1::2]
-    x = np.geomspace(1.0, 1.0 / ratio, _points(band, PER_DECADE))[:, None]
+    x = np.geomspace(1.0, 1.0 / ratio, _points(band, POINTS_PER_DECADE))[:, None]
     values = np.sqrt(x[:, 0]) * np.prod(x + even, axis=1) / np.prod(x + odd, axis=1)
     D = 2.0 / (values.max() + values.min())
     others = np.where(np.eye(count, dtype=bool), 1.0, odd[None, :] - odd[:, None])
@@ -66,7 +66,7 @@ def constant_loss(count: int, band: tuple[float, float]) -> Branches:
     return Branches(np.asarray(g), np.asarray(2.0 * np.pi * low * np.sqrt(odd)))
 
 
-def band_points(band: tuple[float, float], per_decade: int = PER_DECADE) -> FloatArray:
+def band_points(band: tuple[float, float], per_decade: int = POINTS_PER_DECADE) -> FloatArray:
     """Give angular frequencies over a band [Hz], its ends among them."""
     return np.asarray(2.0 * np.pi * np.geomspace(*band, _points(band, per_decade)))
 

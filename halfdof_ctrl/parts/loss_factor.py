@@ -37,10 +37,10 @@ from halfdof_ctrl.parts.loss_stiffness import NAMED_SHARE, directions, require_s
 Keep: TypeAlias = Literal["loss", "factor"]
 LossFactor: TypeAlias = float | Callable[[FloatArray], FloatArray] | tuple[Sequence[float], Sequence[float]] | None
 
-STEEPEST = 1.0  #: slope of the loss over frequency in log-log that springs and dampers can follow
+STEEPEST_LOSS = 1.0  #: slope of the loss over frequency in log-log that springs and dampers can follow
 SLOPE_ROUNDING = 1e-6  #: by which a computed slope may exceed it
 STIFFNESS_ROUNDING = 1e-12  #: of the largest: a negative eigenvalue of the static stiffness below is rounding
-MOST_BRANCHES = 1000  #: more than any loss over frequency needs
+LOSS_FACTOR_MOST_BRANCHES = 1000  #: more than any loss over frequency needs
 SHIFT = 1e-9  #: of its diagonal, added to a sparse stiffness that is singular
 
 
@@ -200,7 +200,7 @@ def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> 
         raise ParameterError(msg, parameter="loss_factor", value=None)
     slope = np.diff(np.log(values)) / np.diff(np.log(omega))
     worst = int(np.argmax(np.abs(slope)))
-    if abs(slope[worst]) > STEEPEST + SLOPE_ROUNDING:
+    if abs(slope[worst]) > STEEPEST_LOSS + SLOPE_ROUNDING:
         f = float(omega[worst] / (2.0 * np.pi))
         msg = (
             f"The loss changes as f^{slope[worst]:.2f} at {f:.4g} Hz, but springs and dampers follow slopes from -1 to "
@@ -350,9 +350,11 @@ def _require_options(keep: Keep, branches: int | None, tol: float) -> None:
         msg = f"keep must be one of {listed(get_args(Keep))}, not {shown(keep)}."
         raise ParameterError(msg, parameter="keep", value=keep)
     if branches is not None and not (
-        is_real_number(branches) and isinstance(branches, int | np.integer) and 0 < branches <= MOST_BRANCHES
+        is_real_number(branches)
+        and isinstance(branches, int | np.integer)
+        and 0 < branches <= LOSS_FACTOR_MOST_BRANCHES
     ):
-        msg = f"branches = {shown(branches)}, but it must be a whole number from 1 to {MOST_BRANCHES}."
+        msg = f"branches = {shown(branches)}, but it must be a whole number from 1 to {LOSS_FACTOR_MOST_BRANCHES}."
         raise ParameterError(msg, parameter="branches", value=branches)
     if not (isinstance(tol, int | float) and 0.0 < tol < 1.0):
         msg = f"tol = {shown(tol)}, but it is a relative error: a number between 0 and 1, such as 0.02."

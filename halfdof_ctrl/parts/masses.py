@@ -21,9 +21,9 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import FORCE_PREFIX
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.parts.links import AXES, Axes, axis_name, checked, part_axes
+from halfdof_ctrl.parts.links import LINKS_AXES, Axes, axis_name, checked, part_axes
 
-TRANSLATIONS = 3
+N_TRANSLATIONS = 3
 INERTIA_ROUNDING = 1e-12  #: of the largest moment of inertia: the matrix is symmetric and semidefinite up to this
 
 
@@ -53,7 +53,7 @@ def point_mass(m: float, axes: Axes = "z") -> SecondOrderModel:
     (('z',), [[40.0, 0.0], [0.0, 40.0]])
     """
     found = part_axes(axes)
-    if not set(found) <= set(AXES[:TRANSLATIONS]):
+    if not set(found) <= set(LINKS_AXES[:N_TRANSLATIONS]):
         msg = f"axes = {shown(axes)}, but a point mass moves along x, y, z alone. Take rigid_body for rotations."
         raise ParameterError(msg, parameter="axes", value=axes)
     mass = checked(m, "m", "kg", positive=True)
@@ -101,19 +101,19 @@ def rigid_body(
     (('front_x', 'front_y', 'front_z'), [0.0, 0.0, 1.0, 0.0, -0.5, 0.0])
     """
     mass, tensor = checked(m, "m", "kg", positive=True), _checked_inertia(inertia)
-    M = np.zeros((len(AXES), len(AXES)))
-    M[:TRANSLATIONS, :TRANSLATIONS], M[TRANSLATIONS:, TRANSLATIONS:] = mass * np.eye(TRANSLATIONS), tensor
-    rows, names = [np.eye(len(AXES))], list(AXES)
+    M = np.zeros((len(LINKS_AXES), len(LINKS_AXES)))
+    M[:N_TRANSLATIONS, :N_TRANSLATIONS], M[N_TRANSLATIONS:, N_TRANSLATIONS:] = mass * np.eye(N_TRANSLATIONS), tensor
+    rows, names = [np.eye(len(LINKS_AXES))], list(LINKS_AXES)
     require_mapping({} if points is None else points, "points", "from names to places (x, y, z) [m]")
     require_switch(rotations, "rotations")
     for name, place in (points or {}).items():
-        axes = AXES if rotations else AXES[:TRANSLATIONS]
+        axes = LINKS_AXES if rotations else LINKS_AXES[:N_TRANSLATIONS]
         rows.append(_lever(name, place)[: len(axes)])
         names += [axis_name(name, axis) for axis in axes]
     F = np.vstack(rows)
     return mechss(
         M, None, None, F.T, F,
-        dofs=AXES, outputs=names, inputs=[FORCE_PREFIX + name for name in names], name="rigid_body",
+        dofs=LINKS_AXES, outputs=names, inputs=[FORCE_PREFIX + name for name in names], name="rigid_body",
     )  # fmt: skip
 
 
@@ -130,15 +130,15 @@ def _lever(name: str, place: Sequence[float]) -> FloatArray:
     if not np.isfinite([X, Y, Z]).all():
         msg = f"Point {shown(name)} is at {shown(place)}: every coordinate must be a finite number [m]."
         raise ParameterError(msg, parameter=name, value=place)
-    rows = np.eye(len(AXES))
-    rows[:TRANSLATIONS, TRANSLATIONS:] = [[0.0, Z, -Y], [-Z, 0.0, X], [Y, -X, 0.0]]
+    rows = np.eye(len(LINKS_AXES))
+    rows[:N_TRANSLATIONS, N_TRANSLATIONS:] = [[0.0, Z, -Y], [-Z, 0.0, X], [Y, -X, 0.0]]
     return rows
 
 
 def _checked_inertia(inertia: npt.ArrayLike) -> FloatArray:
     """Give the (3, 3) tensor, and refuse one that no body has: J is semidefinite, and no moment exceeds the others."""
     given = real_numbers(inertia, "inertia", "three moments or a 3 x 3 tensor [kg m^2]")
-    tensor = checked_matrix(np.diag(given) if given.shape == (TRANSLATIONS,) else given, "J", (TRANSLATIONS,) * 2)
+    tensor = checked_matrix(np.diag(given) if given.shape == (N_TRANSLATIONS,) else given, "J", (N_TRANSLATIONS,) * 2)
     if np.iscomplexobj(tensor) or np.abs(tensor - tensor.T).max() > INERTIA_ROUNDING * np.abs(tensor).max():
         msg = f"inertia = {tensor.tolist()} kg m^2 is not a real symmetric tensor."
         raise ParameterError(msg, parameter="inertia", value=inertia)

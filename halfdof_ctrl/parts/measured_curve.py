@@ -24,7 +24,7 @@ NORMAL_MEDIAN = 0.6745  #: of the size of a normal variable, in standard deviati
 COMPLEX_MEDIAN = 0.8326  #: of the size of a complex one, the root of log 2
 SIGMAS = 4.0  #: a negative loss beyond so many times the scatter is no scatter
 LOSS_ROUNDING = 1e-12  #: of |K|: a negative loss below is none
-FEWEST = 2  #: points of a curve
+FEWEST_MEASURED = 2  #: points of a curve
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -100,7 +100,7 @@ def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple
     except Exception as cause:
         msg = f"frequency must be a list of real numbers [Hz] and stiffness one of complex numbers: {cause}."
         raise ParameterError(msg, parameter="stiffness", value=None) from cause
-    if f.ndim != 1 or f.shape != K.shape or f.size < FEWEST:
+    if f.ndim != 1 or f.shape != K.shape or f.size < FEWEST_MEASURED:
         msg = (
             f"frequency has the shape {f.shape} and stiffness {K.shape}, but both must be lists of the same length, "
             "two points at least."

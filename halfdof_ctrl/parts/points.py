@@ -13,7 +13,7 @@ from halfdof_ctrl.base.errors import ParameterError, SignalNameError
 from halfdof_ctrl.base.names import checked_names, listed, motions
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.parts.links import AXES
+from halfdof_ctrl.parts.links import LINKS_AXES
 from halfdof_ctrl.parts.ties import Row
 
 
@@ -36,7 +36,7 @@ class Points:
         """
         if name in self.rows:
             return (name,)
-        found = tuple([f"{name}_{axis}" for axis in AXES if f"{name}_{axis}" in self.rows])
+        found = tuple([f"{name}_{axis}" for axis in LINKS_AXES if f"{name}_{axis}" in self.rows])
         if not found:
             part = max(
                 (part for part in set(self.part_of.values()) if name.startswith(f"{part}_")), key=len, default=""
@@ -59,7 +59,7 @@ class Points:
         if len(first) == len(second) == 1:
             return [(first[0], second[0])]
         by_axis = [{name.rpartition("_")[2]: name for name in names} for names in (first, second)]
-        common = [axis for axis in AXES if axis in by_axis[0] and axis in by_axis[1]]
+        common = [axis for axis in LINKS_AXES if axis in by_axis[0] and axis in by_axis[1]]
         if len(common) != min(len(first), len(second)) or not common:
             msg = (
                 f"{a} and {b} have not the same axes: {listed(first)} and {listed(second)}. Name the axes one by one, "

@@ -27,7 +27,7 @@ from halfdof_ctrl.parts.rubber import generalized_maxwell
 
 ABOVE_SCATTER = 1.4  #: an rms larger than this many times the scatter is no scatter ...
 IN_ROWS = 0.4  #: ... if neighbours of the residual are correlated by more than this ...
-VISIBLE = 0.002  #: ... and it is larger than this part of the curve
+VISIBLE_MISFIT = 0.002  #: ... and it is larger than this part of the curve
 UNDETERMINED = 0.1  #: standard error of k0, in parts of it, from which on it is said
 
 
@@ -204,7 +204,7 @@ def _follows(curve: MeasuredCurve, series: Series, grid: Series) -> bool:
     for candidate in (series, grid):
         rest = _weighted_residual(curve, candidate)
         size = rms(curve, candidate)
-        if size <= VISIBLE or size <= ABOVE_SCATTER * _noise(rest) or lag_one(rest) <= IN_ROWS:
+        if size <= VISIBLE_MISFIT or size <= ABOVE_SCATTER * _noise(rest) or lag_one(rest) <= IN_ROWS:
             return True
     return False
 

@@ -19,10 +19,10 @@ from halfdof_ctrl.parts.loewner import rational_rates
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve, scatter
 from halfdof_ctrl.parts.prony_series import OUTSIDE, Series, best_sizes, refined, relaxing
 
-PER_DECADE = 10  #: rates of the grid
+TRIALS_PER_DECADE = 10  #: rates of the grid
 PER_DECADE_EXACT = 20  #: the same where the curve has no scatter
 BEYOND = 10.0  #: the grid reaches beyond the band by this factor
-SMOOTH = 1e-5  #: scatter of a curve that was computed, not measured
+SMOOTH_MISFIT = 1e-5  #: scatter of a curve that was computed, not measured
 PERHAPS_EXACT = 3e-3  #: the same, where it is worth a trial
 HOPEFUL = 0.03  #: rms up to which rates of a rational function are refined
 EXACT = 1e-11  #: rms of a series that is the curve
@@ -50,9 +50,9 @@ def rms(curve: MeasuredCurve, series: Series) -> float:
 
 def best_series(curve: MeasuredCurve, most: int) -> Found:
     """Find the best series of every order up to `most`."""
-    grid = _on_grid(curve, PER_DECADE)
+    grid = _on_grid(curve, TRIALS_PER_DECADE)
     left = scatter(curve.weights[0] * (curve.values - grid.values(curve.omega)))
-    smooth = left < SMOOTH
+    smooth = left < SMOOTH_MISFIT
     if smooth:
         grid = _on_grid(curve, PER_DECADE_EXACT)
     best: dict[int, Series] = {}
@@ -82,7 +82,7 @@ def _clustered(curve: MeasuredCurve, grid: Series, most: int) -> Series:
     w = grid.w
     if w.size == 0:
         return grid
-    step = 10.0 ** (1.5 / PER_DECADE)
+    step = 10.0 ** (1.5 / TRIALS_PER_DECADE)
     groups = np.split(np.arange(w.size), np.flatnonzero(w[1:] > step * w[:-1]) + 1)
     centres = [float(np.exp(np.average(np.log(w[group]), weights=grid.k[group]))) for group in groups]
     series, _ = best_sizes(curve, np.array(centres))

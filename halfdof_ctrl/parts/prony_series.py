@@ -18,7 +18,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.parts.measured_curve import MeasuredCurve
 
 OUTSIDE = 30.0  #: rates lie within the band and this factor below and above it: beyond, nothing shows them
-TINY = 1e-14  #: of the largest column: a size below is a zero of the least squares
+TINY_BRANCH = 1e-14  #: of the largest column: a size below is a zero of the least squares
 TOLERANCE = 1e-15  #: of the least squares, so that exact curves give parameters to rounding
 ROUNDS = 6  #: of refinement and non-negative least squares in turns
 WORTHWHILE = 0.99  #: of the cost: a round that lowers it by less is the last
@@ -66,7 +66,7 @@ def best_sizes(curve: MeasuredCurve, w: FloatArray, extra: Sequence[ComplexArray
     scaled = columns / norms
     target = curve.weighted(curve.values)
     found, _ = scipy.optimize.nnls(scaled, target, maxiter=max(100, 20 * norms.size))
-    active = found > TINY * found.max(initial=0.0)
+    active = found > TINY_BRANCH * found.max(initial=0.0)
     if active.any():  # once more by orthogonal factors, which keep the digits that normal equations lose
         again = np.linalg.lstsq(scaled[:, active], target, rcond=None)[0]
         if (again >= 0.0).all():

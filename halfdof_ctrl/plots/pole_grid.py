@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 from halfdof_ctrl.base.arrays import FloatArray
 
 WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
-FAR = 20.0  #: times all others, those that swing among them: a point so far out gets logarithmic axes too
+FAR_LINES = 20.0  #: times all others, those that swing among them: a point so far out gets logarithmic axes too
 LOGARITHMIC_LABELS = (1e-3, 1e4)  #: numbers outside are written with a power of ten
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 DISCRETE_RATIOS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
@@ -24,7 +24,7 @@ EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
 SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
-TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
+GRID_TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
 CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 
 
@@ -56,7 +56,7 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
 def _is_squeezed(points: npt.NDArray[np.complexfloating]) -> bool:
     """Tell whether a point far out would leave those that swing no room on linear axes."""
     swinging = np.abs(points[points.imag != 0.0])
-    near = swinging[swinging * FAR < np.abs(points).max(initial=0.0)]
+    near = swinging[swinging * FAR_LINES < np.abs(points).max(initial=0.0)]
     return bool(near.size > 0)
 
 
@@ -75,7 +75,7 @@ def draw_pole_grid(ax: Axes) -> None:
         last = end
         _draw_mirrored(ax, ray)
         side = "left" if end[0] < 0.5 else "center"  # noqa: PLR2004
-        ax.text(end[0] + 0.005, end[1] - 0.008, f"ζ = {zeta:g}", transform=ax.transAxes, ha=side, va="top", **TEXT)
+        ax.text(end[0] + 0.005, end[1] - 0.008, f"ζ = {zeta:g}", transform=ax.transAxes, ha=side, va="top", **GRID_TEXT)
     small = np.geomspace(1e-16, np.pi / 4.0, 250)
     angles = np.concatenate([np.pi / 2.0 + small, np.pi - small[::-1]])
     last = np.full(2, np.inf)
@@ -87,7 +87,9 @@ def draw_pole_grid(ax: Axes) -> None:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
             if np.hypot(*(middle - last)) > LABELS_APART and middle[0] > EDGE:
-                ax.text(middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **TEXT)
+                ax.text(
+                    middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **GRID_TEXT
+                )
                 last = middle
 
 
@@ -101,7 +103,7 @@ def draw_discrete_grid(ax: Axes) -> None:
         ray = np.exp(np.linspace(0.0, top, 300) * complex(-zeta, np.sqrt(1.0 - zeta**2)))
         _draw_mirrored(ax, ray)
         place = ray[np.searchsorted(np.linspace(0.0, top, 300), 0.42 * top)]
-        ax.text(place.real, place.imag, f"{zeta:g}", **CENTRED, **TEXT)
+        ax.text(place.real, place.imag, f"{zeta:g}", **CENTRED, **GRID_TEXT)
     decay = np.linspace(0.0, 1.0, 200)
     for tenth in range(1, 11):
         angle = 0.1 * tenth * np.pi
@@ -109,7 +111,7 @@ def draw_discrete_grid(ax: Axes) -> None:
         _draw_mirrored(ax, arc)
         if tenth % 2 == 0 and tenth < 10:  # noqa: PLR2004  # the last one lies on the real axis
             edge = 1.09 * arc[0]
-            ax.text(edge.real, edge.imag, f"{0.1 * tenth:.1f}π/T", **CENTRED, **TEXT)
+            ax.text(edge.real, edge.imag, f"{0.1 * tenth:.1f}π/T", **CENTRED, **GRID_TEXT)
 
 
 def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str) -> None:

@@ -36,7 +36,7 @@ ZERO_MARK: dict[str, Any] = {
     "zorder": 3.1,  # hollow and above crosses and rings, so that neither hides the other
 }
 CLOSED: dict[str, Any] = {**CROSS, "color": "C3"}
-NOTHING: dict[str, Any] = {"marker": "", "color": "none"}
+NO_MARK: dict[str, Any] = {"marker": "", "color": "none"}
 
 
 def pole_map_plot(
@@ -120,7 +120,7 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
             *_poles_of_A(sysdata, closed),
             (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
             (zeros(sysdata), "zeros", ZERO_MARK),
-            (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NOTHING),
+            (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NO_MARK),
         ]
     else:
         poles = bounded_poles(np.asarray(sysdata.A, dtype=float)).values
@@ -129,7 +129,7 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
         marks = [(poles, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
     if feedback is not None:
         marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
-    return [mark for mark in marks if mark[0].size or mark[2] is NOTHING]
+    return [mark for mark in marks if mark[0].size or mark[2] is NO_MARK]
 
 
 def _poles_of_A(model: SecondOrderModel, closed: str) -> list[Mark]:  # noqa: N802

@@ -25,7 +25,7 @@ from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 Kind: TypeAlias = Literal["bode", "poles"]
 
-MANY = 12  #: from so many curves on they are drawn thinner
+MANY_CASES = 12  #: from so many curves on they are drawn thinner
 BRANCH: dict[str, Any] = {"color": "0.6", "linewidth": 0.9, "label": "_branch", "zorder": 2.4}
 FIRST_CASE: dict[str, Any] = {"marker": "x", "markersize": 7.0, "markeredgewidth": 1.8, "zorder": 3.0}
 CASES_BETWEEN: dict[str, Any] = {"marker": "o", "markersize": 4.0, "markeredgewidth": 0.0, "zorder": 2.8}
@@ -144,7 +144,7 @@ def _draw_curves(
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     omega, lines = np.asarray(result.omega), no_lines(axes)
     curves = np.asarray(result.response).reshape(-1, p, m, omega.size)[cases.numbers]
-    width = 1.5 if len(curves) < MANY else 0.9
+    width = 1.5 if len(curves) < MANY_CASES else 0.9
     for (i, j), place in product(np.ndindex(p, m), range(len(curves))):
         style = {"color": cases.colours[place], "linewidth": width, "label": _label(cases, place)}
         values, x = curves[place, i, j], scales.frequency(omega)

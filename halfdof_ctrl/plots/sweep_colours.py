@@ -25,7 +25,7 @@ Numbers: TypeAlias = npt.NDArray[np.intp]
 LIGHTEST = 0.9  #: part of viridis that is seen on white
 MOST_NAMED_VALUES = 6  #: values that a legend names; more of them get a colour bar
 WIDE_VALUES = 30.0  #: ratio of the largest value to the smallest from which colours follow the logarithm
-FEWEST_DIGITS, MOST_DIGITS = 4, 10  #: of a number in a legend
+FEWEST_LABEL_DIGITS, MOST_DIGITS = 4, 10  #: of a number in a legend
 SAME_VALUE = 1e-9  #: relative difference of values that count as one
 ONE_COLOUR: Colour = (0.12, 0.47, 0.71, 1.0)  #: where nothing was varied
 
@@ -59,9 +59,9 @@ def _brief(value: object, among: Values) -> str:
     if not isinstance(value, float) or float(text) == value:
         return text
     others = {other for other in _distinct(among) if isinstance(other, float)}
-    for digits in range(FEWEST_DIGITS, MOST_DIGITS):
+    for digits in range(FEWEST_LABEL_DIGITS, MOST_DIGITS):
         if len({f"{other:.{digits}g}" for other in others}) == len(others):
-            return text if digits == FEWEST_DIGITS else f"{value:.{digits}g}"
+            return text if digits == FEWEST_LABEL_DIGITS else f"{value:.{digits}g}"
     return in_full(value)
 
 

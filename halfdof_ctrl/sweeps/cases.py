@@ -26,7 +26,7 @@ Parameters: TypeAlias = Mapping[str, object] | Sequence[Mapping[str, object]] | 
 
 CASE = "case"  #: name of the axis of a list or sample
 
-SHORT = 7  #: characters of a number that is written as it is
+CASES_SHORT = 7  #: characters of a number that is written as it is
 FOUR_DIGITS, TEN_DIGITS = 1e4, 1e10  #: sizes between which four digits would need a power of ten
 
 
@@ -134,7 +134,7 @@ def in_short(value: object) -> str:
     if not isinstance(value, float):
         return str(value)
     text = in_full(value)
-    return text if len(text) <= SHORT or FOUR_DIGITS <= abs(value) < TEN_DIGITS else f"{value:.4g}"
+    return text if len(text) <= CASES_SHORT or FOUR_DIGITS <= abs(value) < TEN_DIGITS else f"{value:.4g}"
 
 
 def in_full(value: object) -> str:

@@ -24,8 +24,8 @@ from halfdof_ctrl.sweeps.one_case import RESULT_KINDS, CaseResult
 
 FORMAT = "halfdof_ctrl sweep checkpoint"
 VERSION = 1
-ARRAYS = ("poles", "response", "value")
-NAMES = ("inputs", "outputs", "dofs")
+CHECKPOINT_ARRAYS = ("poles", "response", "value")
+CHECKPOINT_NAMES = ("inputs", "outputs", "dofs")
 MODE = 0o666  #: of a new file, less what the user's umask takes away
 
 
@@ -140,18 +140,18 @@ def _parsed(line: bytes) -> dict[str, Any] | None:
 
 
 def _as_plain(result: CaseResult) -> dict[str, object]:
-    arrays = {name: getattr(result, name) for name in ARRAYS}
+    arrays = {name: getattr(result, name) for name in CHECKPOINT_ARRAYS}
     plain: dict[str, object] = {
         name: [array.dtype.newbyteorder("<").str, list(array.shape), _bytes_of(array)]
         for name, array in arrays.items()
         if array is not None
     }
-    return plain | {name: list(getattr(result, name)) for name in NAMES} | {"discrete": result.discrete}
+    return plain | {name: list(getattr(result, name)) for name in CHECKPOINT_NAMES} | {"discrete": result.discrete}
 
 
 def _from_plain(record: Mapping[str, Any]) -> CaseResult:
-    arrays: dict[str, Any] = {name: _array(*record[name]) for name in ARRAYS if name in record}
-    names: dict[str, Any] = {name: tuple(map(str, record[name])) for name in NAMES}
+    arrays: dict[str, Any] = {name: _array(*record[name]) for name in CHECKPOINT_ARRAYS if name in record}
+    names: dict[str, Any] = {name: tuple(map(str, record[name])) for name in CHECKPOINT_NAMES}
     return CaseResult(**arrays, **names, discrete=bool(record["discrete"]))
 
 

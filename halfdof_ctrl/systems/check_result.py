@@ -4,11 +4,11 @@ from dataclasses import asdict, dataclass
 
 from halfdof_ctrl.systems.judged import Grade
 
-WIDTH = 79  #: columns of the printed table, as terminals have them
+TABLE_WIDTH = 79  #: columns of the printed table, as terminals have them
 FIGURES = 37  #: columns in front of the place of the worst error
 VERDICTS = {Grade.OK: "ok", Grade.WITHIN: "within", Grade.FAILED: "FAILED"}
-NONE = "(none)"  #: where nothing was compared
-WITHIN = "ok within what the numbers allow"
+CHECK_RESULT_NONE = "(none)"  #: where nothing was compared
+CHECK_RESULT_WITHIN = "ok within what the numbers allow"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -64,7 +64,9 @@ class CrossCheck:
                 (self.step_grade, self.max_step_error),
             )
             most = max([error for grade, error in rows if grade == Grade.WITHIN], default=0.0)
-            return f"{WITHIN} ({most:.1e})" if most > 0.0 else f"{WITHIN} (the count of states)"
+            return (
+                f"{CHECK_RESULT_WITHIN} ({most:.1e})" if most > 0.0 else f"{CHECK_RESULT_WITHIN} (the count of states)"
+            )
         return "ok" if self.grade == Grade.OK else "failed"
 
     @property
@@ -84,13 +86,13 @@ class CrossCheck:
             ("poles", self.max_pole_error, self.pole_allowed, self.pole_grade, self.pole_worst),
             ("step", self.max_step_error, self.step_allowed, self.step_grade, self.step_worst),
         ]
-        count = VERDICTS[Grade(self.count_grade)] if self.n_finite >= 0 else NONE
+        count = VERDICTS[Grade(self.count_grade)] if self.n_finite >= 0 else CHECK_RESULT_NONE
         figures = [(what, f"{e:.1e}", f"{a:.1e}" if a else "", VERDICTS[Grade(g)], w) for what, e, a, g, w in judged]
         step = [
             ("ct.step", f"{self.step_evaluation_error:.1e}", "", "", f"python-control, {self.step_evaluation_worst}")
         ]
         if self.step_horizon == 0.0:
-            figures[-1], step = ("step", "", "", NONE, self.step_worst), []
+            figures[-1], step = ("step", "", "", CHECK_RESULT_NONE, self.step_worst), []
         return (
             ("states", f"{self.order}", "", count, self._count()),
             *figures,
@@ -108,9 +110,10 @@ class CrossCheck:
 
     def __repr__(self) -> str:
         """Print as a small table, as wide as a terminal."""
+        room = TABLE_WIDTH - FIGURES
         lines = [f"{'':10}{'error':>8}  {'allowed':>7}  {'':6}  worst at"]
         lines += [
-            f"{what:10}{error:>8}  {allowed:>7}  {verdict or '(info)':6}  {_shortened(where, WIDTH - FIGURES)}".rstrip()
+            f"{what:10}{error:>8}  {allowed:>7}  {verdict or '(info)':6}  {_shortened(where, room)}".rstrip()
             for what, error, allowed, verdict, where in self.rows
         ]
         notes = [f"Not checked: {limit}" for limit in self.limits]
@@ -122,7 +125,7 @@ def _shortened(text: str, width: int) -> str:
     """Leave out the middle of what is too long, where names are least telling.
 
     >>> _shortened("a_very_long_name from another at s = 1j", 30)
-    'a_very_long_n..nother at s = 1j'
+    'a_very_long_na..ther at s = 1j'
     """
     if len(text) <= width:
         return text

@@ -9,7 +9,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 
 BASE_POINTS = 600  #: of the logarithmic grid
-MOST_POINTS = 2000
+DEFAULT_GRID_MOST_POINTS = 2000
 FALLBACK_RANGE = (0.1, 10.0)  #: [rad/s] grid of a system that shows no mode away from the origin
 MARGIN = 10.0  #: a grid reaches this factor below and above the modes that are seen
 LIGHT = 0.3  #: damping ratio below which a root makes a peak or notch
@@ -52,14 +52,14 @@ def default_frequencies(poles: ComplexArray, roots: ComplexArray | None = None) 
     light = light[(light.imag > low) & (light.imag < high)]
     if light.size == 0:
         return grid
-    most = (MOST_POINTS - BASE_POINTS) // light.size
+    most = (DEFAULT_GRID_MOST_POINTS - BASE_POINTS) // light.size
     most = int(np.clip(most - (most % 2 == 0), 1, MOST_AROUND))
     around = [_around(root, most) for root in light[np.argsort(light.imag)].tolist()]
     near = np.unique(np.concatenate(around))
     near = near[(near > low) & (near < high)]
     centres = np.unique(light.imag)
-    if near.size > MOST_POINTS - BASE_POINTS:
-        near = centres[:: -(-centres.size // (MOST_POINTS - BASE_POINTS))]
+    if near.size > DEFAULT_GRID_MOST_POINTS - BASE_POINTS:
+        near = centres[:: -(-centres.size // (DEFAULT_GRID_MOST_POINTS - BASE_POINTS))]
     return np.unique(np.concatenate([grid, near]))
 
 

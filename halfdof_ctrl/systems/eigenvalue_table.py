@@ -14,7 +14,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 
 SAME_PAIR = 1e-8  #: relative distance to the conjugate at which two eigenvalues are one pair
 NO_INERTIA = "infinite"
-MOST_ROWS = 20  #: infinite eigenvalues that have a row each
+EIGENVALUE_TABLE_MOST_ROWS = 20  #: infinite eigenvalues that have a row each
 TABLE_TITLES = ("descriptor form", "state space", "difference")
 
 
@@ -69,7 +69,7 @@ def eigenvalue_table(model: SecondOrderModel, sys: control.StateSpace) -> Eigenv
     rows = _paired_rows(finite[first], poles[second])
     rows += [(eigenvalue_in_words(value), "missing", "") for value in np.delete(finite, first).tolist()]
     rows += [("missing", eigenvalue_in_words(value), "") for value in np.delete(poles, second).tolist()]
-    if structure.n_infinite > MOST_ROWS:
+    if structure.n_infinite > EIGENVALUE_TABLE_MOST_ROWS:
         rows.append((f"{structure.n_infinite} {NO_INERTIA}", "none", ""))
     else:
         rows += [(NO_INERTIA, "none", "")] * structure.n_infinite

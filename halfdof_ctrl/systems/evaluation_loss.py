@@ -15,17 +15,21 @@ from scipy.linalg.lapack import dgebal
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
+from halfdof_ctrl.base.spectrum import balanced
+from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
+from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.loss import loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
 EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of A up to which balancing changes next to nothing
-FEW_ENTRIES = 400  #: of A, up to which they are compared as plain numbers, which takes a microsecond
+EVALUATION_LOSS_FEW_ENTRIES = 400  #: of A, up to which they are compared as plain numbers, which takes a microsecond
 UNEVEN = 5e7  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
-MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
-MANY_STATES = 200  #: from which it is measured at one frequency alone
+EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
+EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
+BESIDE_ORIGIN = 1.01  #: times the largest pole that stands for one at the origin: frequencies up to there are not tried
 SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
-ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
+EVALUATION_LOSS_ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
 CURES = {
     "dofs": 'mech2ss(model, states="scaled") keeps the digits, as "energy" does where a model has it, and so does',
     "scaled": 'mech2ss(model, states="energy") keeps more digits where a model has such states, and so does',
@@ -42,7 +46,7 @@ class EvaluationLoss:
     source: int
 
 
-def warn_of_evaluation(sys: control.StateSpace, states: str) -> None:
+def warn_of_evaluation(sys: control.StateSpace, states: str, model: SecondOrderModel) -> None:
     """Warn where python-control's evaluation of a system loses more than 1e-6.
 
     Parameters
@@ -51,6 +55,8 @@ def warn_of_evaluation(sys: control.StateSpace, states: str) -> None:
         As it is handed to the user.
     states : str
         What the states are.
+    model : SecondOrderModel
+        What it was made of.
 
     Warns
     -----
@@ -58,7 +64,8 @@ def warn_of_evaluation(sys: control.StateSpace, states: str) -> None:
     """
     if is_even(sys.A):
         return
-    loss = evaluation_loss(sys)
+    free = free_motion_count(model.M, model.C, model.K) if len(model.dofs) <= FREE_MOTIONS_LARGEST else None
+    loss = evaluation_loss(sys, at_origin=0 if free is None else free.poles)
     if loss is None or not loss.value > WARNED:
         return
     msg = (
@@ -78,28 +85,33 @@ def is_even(A: FloatArray) -> bool:
     >>> is_even(np.array([[0.0, 1.0], [-400.0, -2.0]])), is_even(np.array([[0.0, 1.0], [-1e12, -2.0]]))
     (True, False)
     """
-    if A.size <= FEW_ENTRIES:
+    if A.size <= EVALUATION_LOSS_FEW_ENTRIES:
         sizes = [abs(entry) for entry in A.ravel().tolist() if entry]
         return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
     entries = np.abs(A[A != 0.0])
     return not entries.size or bool(entries.max() <= EVEN_ENTRIES * entries.min())
 
 
-def evaluation_loss(sys: control.StateSpace) -> EvaluationLoss | None:
+def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLoss | None:
     """Measure what python-control's evaluation loses, at the frequencies where it shows.
 
     None where it can lose nothing. An error is relative to the value, or to a thousandth of the channel's largest where
-    the value is smaller.
+    the value is smaller. So many of the slowest poles of A are zeros that rounding has moved: nobody looks there.
     """
     A = np.asarray(sys.A, dtype=float)
-    if len(A) > MOST_STATES or not _is_uneven(A):
+    if len(A) > EVALUATION_LOSS_MOST_STATES or not _is_uneven(A):
         return None
     points = loss_points(A)
-    points = points[:1] if len(A) > MANY_STATES else points
+    if at_origin:
+        slowest = np.sort(np.abs(np.linalg.eigvals(balanced(A))))
+        points = points[np.abs(points) > BESIDE_ORIGIN * slowest[min(at_origin, len(A)) - 1]]
+    points = points[:1] if len(A) > EVALUATION_LOSS_MANY_STATES else points
+    if points.size == 0:
+        return None
     right = system_response(sys, points)
     found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
     size = np.nan_to_num(np.abs(right.values))
-    seen = (size > ZERO_CHANNEL * np.nan_to_num(right.data, nan=np.inf)).any(axis=2, keepdims=True)
+    seen = (size > EVALUATION_LOSS_ZERO_CHANNEL * np.nan_to_num(right.data, nan=np.inf)).any(axis=2, keepdims=True)
     value = np.maximum(size, SHALLOW * size.max(axis=2, keepdims=True))
     told = seen & np.isfinite(right.values) & (value > 0.0)
     with np.errstate(invalid="ignore", over="ignore"):

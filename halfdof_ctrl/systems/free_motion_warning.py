@@ -12,12 +12,12 @@ from scipy.linalg.lapack import dgetrf
 from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.spectrum import balanced_states
-from halfdof_ctrl.model.free_motions import LARGEST, free_motion_count
+from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.state_map import States
 
 USUAL_SPURIOUS = 1e-6  #: of the slowest other pole: a double pole at 0 is moved by 1e-8 of it in any case
-SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
+FREE_MOTION_WARNING_SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
 def warn_of_free_motions(model: SecondOrderModel, sys: control.StateSpace, states: States) -> bool:
@@ -29,7 +29,12 @@ def warn_of_free_motions(model: SecondOrderModel, sys: control.StateSpace, state
         Rounding of A moves them further than that of a double pole does.
     """
     A = np.asarray(sys.A, dtype=float)
-    if states not in ("dofs", "scaled") or A.size == 0 or len(model.dofs) > LARGEST or not _may_be_singular(A):
+    if (
+        states not in ("dofs", "scaled")
+        or A.size == 0
+        or len(model.dofs) > FREE_MOTIONS_LARGEST
+        or not _may_be_singular(A)
+    ):
         return False
     free = free_motion_count(model.M, model.C, model.K)
     if free is None:
@@ -51,4 +56,4 @@ def _may_be_singular(A: FloatArray) -> bool:
     """Tell whether elimination meets a pivot that is zero or nearly so."""
     factors, _, _ = dgetrf(balanced_states(A)[0])
     pivots = np.abs(np.diagonal(factors))
-    return bool(pivots.min() <= SMALL_PIVOT * pivots.max())
+    return bool(pivots.min() <= FREE_MOTION_WARNING_SMALL_PIVOT * pivots.max())

@@ -56,7 +56,7 @@ MORE_MODES = 48  #: ... chosen among so many where channels show few of them
 FEWEST_SHOWN = 6  #: modes that are enough to choose among
 NEAR_PEAKS = np.array([0.98, 0.999, 1.0001, 1.001, 1.02])  #: frequencies around each of them, in parts of it
 NEXT_MODE = 1.2  #: it ends this factor above the last of them
-MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
+FREQUENCY_MOST_STATES = 1000  #: of a sparse model whose frequency response is that of its state space
 POLE_AT_ORIGIN = 1e-7  #: of the largest of a few lowest frequencies: smaller ones are those of rigid motions
 ZERO_EFFORT = 1e7  #: channels times cubed size up to which the grid is refined at zeros
 NYQUIST_SHARE = 0.999  #: of the Nyquist frequency that grids of discrete systems reach
@@ -188,7 +188,7 @@ def has_many_states(model: SecondOrderModel) -> bool:
     if not model.is_sparse:
         return False
     inertial, half = null_column_kinds(model.M, model.C)
-    return bool(2 * np.count_nonzero(inertial) + np.count_nonzero(half) > MOST_STATES)
+    return bool(2 * np.count_nonzero(inertial) + np.count_nonzero(half) > FREQUENCY_MOST_STATES)
 
 
 def model_frequencies(model: SecondOrderModel) -> FloatArray:

@@ -41,7 +41,7 @@ OUTER_BLOCK = 24  #: states whose substitution is done before the rest is update
 INNER_BLOCK = 4  #: states within that, before the rest of the block is updated by another
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
-FEW_STATES = 60  #: up to which products are cut so that each runs on one thread; above, threads are limited
+CUT_PRODUCTS = 60  #: up to which products are cut so that each runs on one thread; above, threads are limited
 ONE_THREAD = 2**18  #: multiplications of a product up to which OpenBLAS takes one thread
 SAFE_GROWTH = 2.0**125  #: growth from one state to the next up to which it is enough to look once an inner block
 ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
@@ -104,7 +104,7 @@ def bounded_response(
     matrix, scale = balanced_states(A)
     balanced = np.asarray(matrix, dtype=np.float64)
     inputs, outputs = np.asarray(B / scale[:, None]), np.asarray(C * scale)
-    with limited_threads(1) if len(A) > FEW_STATES else nullcontext():  # threads would wait for each other
+    with limited_threads(1) if len(A) > CUT_PRODUCTS else nullcontext():  # threads would wait for each other
         if B.shape[1] <= C.shape[0]:
             bound = _Channels(balanced, inputs, outputs).add_to(values, points)
         else:
@@ -277,7 +277,7 @@ def _scale_down(known: ComplexArray, new: int, sums: ComplexArray) -> None:
 def _product(matrix: FloatArray, x: FloatArray) -> FloatArray:
     """Multiply, in pieces so small that none of them starts threads, which takes longer than the work itself."""
     piece = ONE_THREAD // matrix.size
-    if piece >= x.shape[1] or len(x) > FEW_STATES:
+    if piece >= x.shape[1] or len(x) > CUT_PRODUCTS:
         return np.asarray(matrix @ x)
     result = np.empty((len(matrix), x.shape[1]))
     for start in range(0, x.shape[1], piece):

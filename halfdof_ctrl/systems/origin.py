@@ -13,7 +13,7 @@ from halfdof_ctrl.reduction.energy.form import energy_system
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 
 LARGEST_PENCIL = 500  #: DOFs up to which the pencil is asked
-SMALL = 1e-4  #: of the largest pole: where none is smaller, none can be a rounded zero
+SMALL_POLE = 1e-4  #: of the largest pole: where none is smaller, none can be a rounded zero
 IN_DOUBT = 1e4  #: times its bound: a pole above is no rounded zero, whatever the pencil says
 SPECK = 1e-13  #: of the next pole: one below may be the rounding of a stiffness that cancels; of k poles its k-th root
 FOURTH_ROOT = 1e-3  #: of the next pole: a pole above is no rounded zero, however many there are
@@ -43,7 +43,7 @@ def poles_of_model(model: SecondOrderModel, A: FloatArray) -> BoundedPoles:
     """
     poles = bounded_poles(np.asarray(A, dtype=float))
     size = np.abs(poles.values)
-    if size.min(initial=np.inf) > SMALL * size.max(initial=0.0) or len(model.dofs) > LARGEST_PENCIL:
+    if size.min(initial=np.inf) > SMALL_POLE * size.max(initial=0.0) or len(model.dofs) > LARGEST_PENCIL:
         return poles
     if energy_system(model) is not None:
         return poles  # A has exact zeros for free motions, and what else is small is no rounding

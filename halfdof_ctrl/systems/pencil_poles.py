@@ -15,9 +15,9 @@ from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.dense_copy import dense_copy, with_few_signals
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import energy_system
-from halfdof_ctrl.systems.pole_bounds import COARSE, STEP, BoundedPoles, bounded_poles
+from halfdof_ctrl.systems.pole_bounds import COARSE_BOUND, STEP, BoundedPoles, bounded_poles
 
-STEPS = 3  #: of Newton's method
+REFINING_STEPS = 3  #: of Newton's method
 
 
 def pencil_poles(model: SecondOrderModel) -> BoundedPoles:
@@ -48,8 +48,8 @@ def pencil_poles(model: SecondOrderModel) -> BoundedPoles:
 def _improved(parts: tuple[DenseMatrix, DenseMatrix, DenseMatrix], value: complex) -> tuple[complex, float]:
     """Return a better eigenvalue and its bound."""
     step, data = _first_order(parts, value)
-    for _ in range(STEPS):
-        if not abs(step) <= STEP * max(data, COARSE * abs(value)) or value + step == 0.0:
+    for _ in range(REFINING_STEPS):
+        if not abs(step) <= STEP * max(data, COARSE_BOUND * abs(value)) or value + step == 0.0:
             break
         further, bound = _first_order(parts, value + step)
         if not abs(further) < abs(step):

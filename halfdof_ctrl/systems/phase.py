@@ -30,13 +30,13 @@ CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a moti
 SAME = 1e-15  #: of its size: poles and zeros nearer than this are at one place
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
 BESIDE_POLE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
-BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
+PHASE_BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
 POLE_EFFORT = 1.1e9  #: cubed size up to which poles are computed
-ZERO_EFFORT = 3e8  #: channels times cubed size up to which zeros are computed
-BOTH_SIDES = (1.0 - 4.0 * BESIDE_ZERO, 1.0 + 4.0 * BESIDE_ZERO)
+PHASE_ZERO_EFFORT = 3e8  #: channels times cubed size up to which zeros are computed
+BOTH_SIDES = (1.0 - 4.0 * PHASE_BESIDE_ZERO, 1.0 + 4.0 * PHASE_BESIDE_ZERO)
 CIRCLE_EFFORT = 1e8  #: channels times frequencies times squared size up to which half circles are followed
 RATIO = 1.2  #: of the ends of an interval that a half circle spans
-STEP = np.pi / 3.0  #: [rad] largest change between points of a half circle
+PHASE_STEP = np.pi / 3.0  #: [rad] largest change between points of a half circle
 ARC_POINTS = 5
 HALVINGS = 6
 BELOW = 1e-2  #: of the slowest pole: where the phase is what it is at the origin
@@ -75,7 +75,7 @@ def response_phase(data: control.FrequencyResponseData) -> FloatArray:
     phase = np.empty(values.shape)
     for i, j in np.ndindex(*values.shape[:2]):
         found = None
-        if source is not None and poles is not None and channels * source.size**3 <= ZERO_EFFORT:
+        if source is not None and poles is not None and channels * source.size**3 <= PHASE_ZERO_EFFORT:
             found = _by_roots(source, poles, (i, j), omega, values[i, j])
         if found is None and given is not None and given.model is not None:
             found = _by_work(given.model, (i, j), values[i, j])
@@ -119,7 +119,7 @@ def _by_roots(
     phi = plane.swept(omega, z) - plane.swept(omega, p) - begin + rest
     angle = _angle(values)
     away = np.ones(omega.size, dtype=bool)
-    for roots, beside in ((p, BESIDE_POLE), (np.append(z, close), BESIDE_ZERO)):
+    for roots, beside in ((p, BESIDE_POLE), (np.append(z, close), PHASE_BESIDE_ZERO)):
         for root in plane.touching(roots):
             away &= np.abs(omega - root.imag) > beside * omega
     difference = np.abs(_wrapped(angle - phi))[away]
@@ -268,7 +268,7 @@ def _changes(source: KnownSource, channel: tuple[int, int], nodes: FloatArray) -
     for k, part in enumerate(np.split(found, np.cumsum([path.size for path in paths])[:-1])):
         with np.errstate(all="ignore"):
             steps = np.angle(part[1:] / part[:-1])
-        if np.isfinite(steps).all() and np.abs(steps).max(initial=0.0) < STEP:
+        if np.isfinite(steps).all() and np.abs(steps).max(initial=0.0) < PHASE_STEP:
             changes[k] = steps.sum()
             continue
         change = _finer_change(source, channel, ends[k])
@@ -294,7 +294,7 @@ def _finer_change(source: KnownSource, channel: tuple[int, int], ends: FloatArra
         found = source.response(*channel, source.plane.points(_half_circles(ends, turns)))
         if (np.isfinite(found) & (found != 0.0)).all():
             steps = np.angle(found[1:] / found[:-1])
-            if np.abs(steps).max() < STEP:
+            if np.abs(steps).max() < PHASE_STEP:
                 return float(steps.sum())
             count = 2 * count - 1
             continue

@@ -29,7 +29,7 @@ from halfdof_ctrl.systems.state_space import mech2ss
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 SOURCE = "halfdof_source"  #: attribute of a FrequencyResponseData: where its values come from
-LARGEST_PENCIL = 300  #: DOFs of a model up to which poles and zeros are those of its pencil
+PHASE_SOURCES_LARGEST_PENCIL = 300  #: DOFs of a model up to which poles and zeros are those of its pencil
 MOST_REDUCED = 1000  #: states up to which a larger model is reduced for its poles and zeros
 
 
@@ -229,7 +229,7 @@ def with_source(data: control.FrequencyResponseData, source: Source | None) -> c
 def source_of(sysdata: control.StateSpace | SecondOrderModel, sys: control.StateSpace | None = None) -> Source:
     """Return what the phase of a system or model follows from; of a large model, of the state space if there is one."""
     if isinstance(sysdata, SecondOrderModel):
-        if len(sysdata.dofs) <= LARGEST_PENCIL:
+        if len(sysdata.dofs) <= PHASE_SOURCES_LARGEST_PENCIL:
             return ModelSource(sysdata.as_dense())
         return LargeSource(sysdata) if sys is None else SystemSource(StateSpaceData.of(sys), model=sysdata)
     dt = float(sysdata.dt) if sysdata.isdtime(strict=True) else None

@@ -21,10 +21,10 @@ from halfdof_ctrl.base.double_double import added, matrix_product, two_product
 from halfdof_ctrl.base.spectrum import balanced_states
 
 STEPS = 4  #: inverse iterations at most
-COARSE = 1e-3  #: a correction above this part of the eigenvalue calls for an iteration ...
+COARSE_BOUND = 1e-3  #: a correction above this part of the eigenvalue calls for an iteration ...
 DAMPING = 0.1  #: ... or above this part of its real part, which a picture of its peak rests on ...
 RESOLVED = 1e-11  #: ... unless it is below this part of the eigenvalue
-MOST_REFINED = 150  #: states up to which the digits of the damping alone, or a bound, call for one
+POLE_BOUNDS_MOST_REFINED = 150  #: states up to which the digits of the damping alone, or a bound, call for one
 STEP = 4.0  #: an iteration that moves the eigenvalue farther, in units of its doubt or its size, went to another one
 
 
@@ -81,10 +81,10 @@ def _with_bounds(
     correction, data = _first_order(A, values[upper], v, w)
     for k, place in enumerate(upper.tolist()):
         value, step, rounding = complex(values[place]), complex(correction[k]), float(data[k])
-        if _is_coarse(value, step, rounding, fine=len(A) <= MOST_REFINED):
+        if _is_coarse(value, step, rounding, fine=len(A) <= POLE_BOUNDS_MOST_REFINED):
             value, step, rounding = _iterated(A, value, (v[:, k], w[:, k]), step, rounding)
         doubt = abs(step)
-        if doubt <= STEP * max(rounding, COARSE * abs(value)):
+        if doubt <= STEP * max(rounding, COARSE_BOUND * abs(value)):
             value += step
         found[place], bounds[place] = value, rounding + doubt
     _mirror(values, upper, found, bounds)
@@ -99,7 +99,7 @@ def _mirror(values: ComplexArray, upper: npt.NDArray[np.intp], found: ComplexArr
 
 def _is_coarse(value: complex, step: complex, rounding: float, *, fine: bool = True) -> bool:
     size = abs(step)
-    if max(size, rounding if fine else 0.0) > COARSE * abs(value):
+    if max(size, rounding if fine else 0.0) > COARSE_BOUND * abs(value):
         return True
     return fine and size > DAMPING * abs(value.real) and size > RESOLVED * abs(value)
 

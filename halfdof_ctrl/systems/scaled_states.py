@@ -14,7 +14,7 @@ from halfdof_ctrl.base.arrays import FloatArray, IndexArray
 
 MOST_SWEEPS = 50  #: through all DOFs; some ten are enough
 SETTLED_EXPONENT = 0.25  #: a change of an exponent by less is none
-DEEPEST = 20  #: powers of two below the balanced time: slower modes, and those at the origin, count as there
+DEEPEST_SCALE = 20  #: powers of two below the balanced time: slower modes, and those at the origin, count as there
 POWER_STEPS = 16  #: of the iteration for the size of the slowest mode, the second half of which counts
 
 Mask = npt.NDArray[np.bool_]
@@ -91,11 +91,11 @@ def _step(log: FloatArray, exponents: FloatArray, own: Mask) -> float:
 def _slowest(A: FloatArray, exponents: FloatArray, time: float) -> float:
     """Return log2 of the size of the slowest mode, by the power method on the inverse; at least time - DEEPEST."""
     scale = 2.0**exponents
-    shift = 2.0 ** (time - DEEPEST)
+    shift = 2.0 ** (time - DEEPEST_SCALE)
     factors = scipy.linalg.lu_factor(A * scale / scale[:, None] - shift * np.eye(len(A)), check_finite=False)
     x = np.random.default_rng(0).standard_normal(len(A))
     growth = []
     for _ in range(POWER_STEPS):
         x = scipy.linalg.lu_solve(factors, x / np.linalg.norm(x), check_finite=False)
         growth.append(float(np.log2(np.linalg.norm(x))))
-    return float(np.clip(-np.mean(growth[POWER_STEPS // 2 :]), time - DEEPEST, time))
+    return float(np.clip(-np.mean(growth[POWER_STEPS // 2 :]), time - DEEPEST_SCALE, time))

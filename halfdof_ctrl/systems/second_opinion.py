@@ -11,7 +11,7 @@ from halfdof_ctrl.descriptor.first_order import FirstOrderPencil, first_order_pe
 from halfdof_ctrl.descriptor.growth import system_pencil
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-LARGEST = 1000  #: dimension of a pencil up to which slycot is asked, which takes it a second
+SECOND_OPINION_LARGEST = 1000  #: dimension of a pencil up to which slycot is asked, which takes it a second
 
 
 def second_opinion(model: SecondOrderModel) -> str:
@@ -25,8 +25,8 @@ def second_opinion(model: SecondOrderModel) -> str:
     every = list(range(len(model.outputs))), list(range(len(model.inputs)))
     poles = first_order_pencil(model.quadratics.P)
     zeros = first_order_pencil(system_pencil(model, *every))
-    if max(zeros.E.shape) > LARGEST:
-        return f"not asked above dimension {LARGEST}"
+    if max(zeros.E.shape) > SECOND_OPINION_LARGEST:
+        return f"not asked above dimension {SECOND_OPINION_LARGEST}"
     try:
         return f"{_finite_count(poles)} finite eigenvalues, {_finite_count(zeros)} zeros by ag08bd"
     except ImportError:

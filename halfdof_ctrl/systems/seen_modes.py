@@ -26,9 +26,9 @@ Response: TypeAlias = Callable[[ComplexArray], ComplexArray]  #: s (k,) to H (p,
 
 POINTS_AROUND = 16
 TOGETHER = 16.0  #: poles nearer than this times the sum of their bounds are one cluster ...
-SAME = 1e-6  #: ... and those nearer than this part of their size
+SAME_SEEN_POLE = 1e-6  #: ... and those nearer than this part of their size
 WITHIN = 0.1  #: radius of a circle, of the distance to the next pole and of the pole's size
-AROUND = 3.0  #: radius of a circle, of the spread of a cluster
+CIRCLE_AROUND = 3.0  #: radius of a circle, of the spread of a cluster
 CIRCLE_ROUNDING = 64.0 * UNIT_ROUNDOFF  #: of the largest |H| on a circle: coefficients below are none
 VISIBLE = 1e-3  #: part of the rest of H that a pole adds where it adds most
 MOST_TERMS = 8  #: of a principal part
@@ -189,7 +189,7 @@ def _clusters(values: ComplexArray, bounds: FloatArray, *, real: bool) -> list[_
                 other
                 for other in left
                 if abs(values[other] - values[member])
-                <= max(TOGETHER * (bounds[other] + bounds[member]), SAME * abs(values[member]))
+                <= max(TOGETHER * (bounds[other] + bounds[member]), SAME_SEEN_POLE * abs(values[member]))
             ]
             members += near
             left = [other for other in left if other not in near]
@@ -198,7 +198,7 @@ def _clusters(values: ComplexArray, bounds: FloatArray, *, real: bool) -> list[_
         others = np.delete(values, own)
         gap = float(np.abs(others - centre).min(initial=np.inf))
         spread = float(np.abs(values[own] - centre).max())
-        radius = max(WITHIN * min(gap, abs(centre)), AROUND * spread)
+        radius = max(WITHIN * min(gap, abs(centre)), CIRCLE_AROUND * spread)
         height = abs(centre.imag) or abs(centre)
         doubt = TOGETHER * float(bounds[own].max())
         beside = doubt if abs(centre.real) <= doubt < height else 0.0  # where damping is rounding, H on the axis is too

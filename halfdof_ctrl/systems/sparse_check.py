@@ -24,7 +24,7 @@ from halfdof_ctrl.systems.judged import Judged, graded, safety
 from halfdof_ctrl.systems.pole_check import POLE_TOLERANCE
 from halfdof_ctrl.systems.refined_poles import RefinedPoles
 
-MOST_STATES = 2500  #: of a state space whose dense matrices are factorized at every point
+MOST_CHECKED = 2500  #: of a state space whose dense matrices are factorized at every point
 TRIED_POLES = 12  #: poles that are looked for in the descriptor form, the slowest and some of the others
 SLOWEST = 6  #: of these
 SEPARATED = 1e-2  #: relative distance of a pole from the next one: inverse iteration finds no closer ones apart
@@ -43,13 +43,13 @@ def require_few_states(model: SecondOrderModel, sys: control.StateSpace) -> None
     ModelSizeError
         More than 2500 states.
     """
-    if sys.nstates > MOST_STATES:
+    if sys.nstates > MOST_CHECKED:
         msg = (
-            f"crosscheck factorizes dense matrices of up to {MOST_STATES} states at every frequency; this system has "
+            f"crosscheck factorizes dense matrices of up to {MOST_CHECKED} states at every frequency; this system has "
             f"{sys.nstates}, of {len(model.dofs)} DOFs. Nothing is said about it. Check a coarser model of the same "
             "structure, or the small one that truncate_modes makes."
         )
-        raise ModelSizeError(msg, size=sys.nstates, limit=MOST_STATES)
+        raise ModelSizeError(msg, size=sys.nstates, limit=MOST_CHECKED)
 
 
 def sparse_response(model: SecondOrderModel, points: ComplexArray, advance: Callable[[int], None]) -> RefinedResponse:

@@ -35,7 +35,7 @@ from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.systems.scaled_states import unit_exponents
 
 States: TypeAlias = Literal["dofs", "scaled", "energy", "modal"]
-KINDS: tuple[States, ...] = ("dofs", "scaled", "energy", "modal")
+STATE_KINDS: tuple[States, ...] = ("dofs", "scaled", "energy", "modal")
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True, repr=False)
@@ -199,8 +199,8 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
 
 def require_kind(states: str) -> None:
     """Refuse a kind of states that there is not."""
-    if not is_choice(states, KINDS):
-        msg = f"states must be one of {', '.join(map(repr, KINDS))}, not {shown(states)}."
+    if not is_choice(states, STATE_KINDS):
+        msg = f"states must be one of {', '.join(map(repr, STATE_KINDS))}, not {shown(states)}."
         raise ParameterError(msg, parameter="states", value=states)
 
 

@@ -129,8 +129,9 @@ def mech2ss(
         require_matrix(model, "mech2ss", parameter="model")
         model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
     system = system_of_model(model, improper=improper, states=states)
-    if not warn_of_free_motions(model.model if isinstance(model, ExactReduction) else model, system, states):
-        warn_of_evaluation(system, states)
+    looked_at = model.model if isinstance(model, ExactReduction) else model
+    if not warn_of_free_motions(looked_at, system, states):
+        warn_of_evaluation(system, states, looked_at)
     return system
 
 

@@ -20,11 +20,11 @@ from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 STEP_TOLERANCE = 1e-9  #: relative to the channel's largest value
 ROUNDINGS = 3  #: tried, of which the largest change counts: a single one may happen to change next to nothing
-ROUNDED = 16.0  #: eps, or what entries are known to: how much these change each number
-MOST_INPUTS = 8  #: for which python-control's own response is measured ...
+STEP_CHECK_ROUNDED = 16.0  #: eps, or what entries are known to: how much these change each number
+STEP_CHECK_MOST_INPUTS = 8  #: for which python-control's own response is measured ...
 MANY_STATES = 200  #: ... and one of a system with more states
 STEP_WORK = 1e5  #: steps times unknowns of one integration, for eight inputs or fewer; the horizon ends early for it
-FEWEST_STEPS = 50  #: of an integration
+STEP_CHECK_FEWEST_STEPS = 50  #: of an integration
 MOST_STEPS = 1500  #: of an integration
 FEW_UNKNOWNS = 200  #: up to which steps may have any number of lengths ...
 FEW_LENGTHS = 2  #: ... and above which so many, since each takes factorizations
@@ -58,8 +58,8 @@ def compare_steps(
         words = "not followed: a step has no derivative for Bv, Ba, Dv, Da"
         return StepCheck(judged=Judged.nothing(words), horizon=0.0, evaluation=0.0, evaluation_worst="not followed")
     unknowns = 2 * len(model.dofs) + sys.nstates
-    work = unknowns * max(1.0, sys.ninputs / MOST_INPUTS)
-    steps = int(np.clip(STEP_WORK / work, FEWEST_STEPS, MOST_STEPS))
+    work = unknowns * max(1.0, sys.ninputs / STEP_CHECK_MOST_INPUTS)
+    steps = int(np.clip(STEP_WORK / work, STEP_CHECK_FEWEST_STEPS, MOST_STEPS))
     plan = step_plan(moving, steps)[: None if unknowns <= FEW_UNKNOWNS else FEW_LENGTHS]
     data = StateSpaceData.of(sys)
     exact, found = descriptor_step_response(model, plan), system_step_response(*data, plan)
@@ -70,7 +70,7 @@ def compare_steps(
     room = _allowed(model, data, plan) if (difference > STEP_TOLERANCE * largest).any() else np.zeros(largest.shape)
     errors, allowed = difference / largest, np.broadcast_to(room / largest, difference.shape)
     grade, place = graded(errors, allowed, STEP_TOLERANCE)
-    evaluated = _by_control(data, plan, min(sys.ninputs, MOST_INPUTS if sys.nstates <= MANY_STATES else 1))
+    evaluated = _by_control(data, plan, min(sys.ninputs, STEP_CHECK_MOST_INPUTS if sys.nstates <= MANY_STATES else 1))
     lost = np.nan_to_num(
         np.abs(evaluated - found[:, : evaluated.shape[1]]) / largest[:, : evaluated.shape[1]], nan=np.inf
     )
@@ -135,7 +135,7 @@ def _rounded(model: SecondOrderModel, seed: int) -> SecondOrderModel:
 
 
 def _shares(generator: np.random.Generator, shape: tuple[int, ...], known: float) -> FloatArray:
-    return ROUNDED * known * generator.uniform(-1.0, 1.0, shape)
+    return STEP_CHECK_ROUNDED * known * generator.uniform(-1.0, 1.0, shape)
 
 
 def _where(model: SecondOrderModel, time: FloatArray, i: Any, j: Any, k: Any) -> str:  # noqa: ANN401  # integers of numpy

@@ -10,7 +10,7 @@ from halfdof_ctrl.design.care_problem import CareProblem
 from halfdof_ctrl.design.modal_basis import ModalBasis
 from halfdof_ctrl.design.newton import solved_by_newton
 from halfdof_ctrl.design.riccati import solved_care
-from halfdof_ctrl.design.starts import LARGE, starts
+from halfdof_ctrl.design.starts import STARTS_LARGE, starts
 from halfdof_ctrl.reduction.energy.form import energy_form
 from support.beams import beam_matrices
 from support.riccati_truth import gain_of_structure
@@ -56,7 +56,7 @@ def chain_with_a_slow_mode(size: int, reach: float) -> tuple[CareProblem, FloatA
     return CareProblem(A, B, Q, np.eye(1), np.zeros((size, 1))), expected
 
 
-@pytest.mark.parametrize("size", [30, LARGE + 4])
+@pytest.mark.parametrize("size", [30, STARTS_LARGE + 4])
 def test_mode_that_is_reached_by_little_has_its_gain(size: int) -> None:
     """For x' = b u and weights 1 the gain is 1, whatever b is; states that are not driven get none."""
     problem, expected = chain_with_a_slow_mode(size, 1e-7)
@@ -83,7 +83,7 @@ def test_start_that_does_not_stabilize_is_none() -> None:
 
 def test_slowest_modes_give_the_first_start_of_many_states() -> None:
     """It stabilizes, and leaves the fast states to themselves."""
-    problem, expected = chain_with_a_slow_mode(LARGE + 4, 1.0)
+    problem, expected = chain_with_a_slow_mode(STARTS_LARGE + 4, 1.0)
     X, gain = next(iter(starts(problem, "scipy")))
     assert X is None
     assert_allclose(gain, expected, rtol=1e-6, atol=1e-12)

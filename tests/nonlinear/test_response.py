@@ -224,7 +224,7 @@ def test_two_times_are_two_times() -> None:
     ("arguments", "kind", "message"),
     [
         (([0, 0],), MatrixError, r"that rise from one to the next"),
-        ((["a"],), MatrixError, r"timepts must be rising numbers"),
+        ((["a"],), ParameterError, r"timepts must be rising numbers"),
         (([0, 1], [1, 2, 3]), MatrixError, r"inputs have the shape \(3,\), but there are 1 inputs and 2 times"),
         (([0, 1], [1, np.nan]), MatrixError, r"inputs hold NaN or Inf \(F_y\)"),
         (([0, 1], {"F": 1}), SignalNameError, r"no input 'F'"),

@@ -93,6 +93,8 @@ def test_rounding_in_null_vectors_does_not_hide_a_singular_leading_matrix(
         exact_reduction(mechss(M, C, K), method="orthogonal")
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
+@pytest.mark.filterwarnings(r"ignore:The model has \d+ free motion:halfdof_ctrl.errors.LostDigitsWarning")
 @given(structure=structures())
 def test_transfer_function_equals_exact_rational_arithmetic(structure: Structure) -> None:
     """Each channel of the state space is the exact ``P(s)^-1`` to 1e-10, or what rcond(W) announces."""
@@ -158,6 +160,7 @@ def test_load_on_a_massless_dof_has_the_published_static_answer() -> None:
 POWERS = st.lists(st.integers(-9, 9), min_size=8, max_size=8)
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 @given(structure=damped_structures(), columns=POWERS, rows=POWERS)
 def test_units_of_dofs_and_equations_change_nothing(structure: Structure, columns: list[int], rows: list[int]) -> None:
     """DOFs in units of 10^k, equations multiplied by 10^l: same kinds of DOF, same transfer function."""
@@ -182,6 +185,7 @@ def test_units_do_not_change_rank_decisions_of_mixed_coordinates(
     assert exact_reduction(scaled, method="orthogonal").order == plain.order
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 @given(structure=damped_structures(), power=st.integers(-9, 9))
 def test_unit_of_time_moves_only_the_frequency(structure: Structure, power: int) -> None:
     """``M tau^2, C tau`` has the transfer function of ``M, C`` at ``tau s``."""

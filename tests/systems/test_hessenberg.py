@@ -205,6 +205,7 @@ def test_shifted_solver_solves_the_shifted_system(seed: int, states: int) -> Non
         assert_allclose(states_found[:, k], desired, rtol=0.0, atol=ROUNDOFF * np.abs(desired).max())
 
 
+@pytest.mark.filterwarnings("ignore:A, B, C and D are right:halfdof_ctrl.errors.LostDigitsWarning")
 @pytest.mark.parametrize("elements", [2, 6, 12])
 def test_bound_is_never_below_the_error(elements: int) -> None:
     """The tip of a beam, on and beside its modes and between them: against 60 digits of the stored A, B, C."""

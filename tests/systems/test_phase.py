@@ -172,7 +172,7 @@ def test_integrators_start_at_minus_90_in_the_z_plane() -> None:
 
 def test_work_tells_the_phase_where_nothing_else_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without roots and half circles: displacement, velocity and acceleration at the force, from three points each."""
-    monkeypatch.setattr(phase, "ZERO_EFFORT", 0.0)
+    monkeypatch.setattr(phase, "PHASE_ZERO_EFFORT", 0.0)
     monkeypatch.setattr(phase, "CIRCLE_EFFORT", 0.0)
     model = chain(4, 1e-3)
     for output, middle in (("q1", -90.0), ("q1_dot", 0.0), ("q1_ddot", 90.0)):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import hydromount, mechss
-from halfdof_ctrl.systems.second_opinion import LARGEST, second_opinion
+from halfdof_ctrl.systems.second_opinion import SECOND_OPINION_LARGEST, second_opinion
 
 
 def test_slycot_counts_the_eigenvalues_and_zeros_of_the_mount() -> None:
@@ -16,6 +16,6 @@ def test_slycot_counts_the_eigenvalues_and_zeros_of_the_mount() -> None:
 
 def test_large_pencils_are_not_asked_for() -> None:
     """They would take too long."""
-    n = LARGEST + 1
+    n = SECOND_OPINION_LARGEST + 1
     model = mechss(None, None, np.eye(n), np.eye(n)[:, :1], np.eye(n)[:1])
-    assert second_opinion(model) == f"not asked above dimension {LARGEST}"
+    assert second_opinion(model) == f"not asked above dimension {SECOND_OPINION_LARGEST}"

@@ -17,7 +17,7 @@ from halfdof_ctrl import (
     step_response,
     transmissibility_response,
 )
-from halfdof_ctrl.systems.default_grid import MOST_POINTS, default_frequencies
+from halfdof_ctrl.systems.default_grid import DEFAULT_GRID_MOST_POINTS, default_frequencies
 from halfdof_ctrl.systems.frequency import model_frequencies
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import seen_by_vectors, seen_modes
@@ -94,7 +94,7 @@ def test_grids_are_small_and_meet_every_peak(roots: list[tuple[float, float]]) -
     """At most 2000 rising points, one at the tip of every lightly damped peak."""
     poles = np.array([10.0**size * complex(-(10.0**zeta), 1.0) for size, zeta in roots])
     grid = default_frequencies(poles)
-    assert grid.size <= MOST_POINTS
+    assert grid.size <= DEFAULT_GRID_MOST_POINTS
     assert (np.diff(grid) > 0.0).all()
     for pole in poles[np.abs(poles.real) < 0.05 * poles.imag]:
         assert np.abs(grid - pole.imag).min() == 0.0
@@ -117,7 +117,7 @@ def test_a_fast_pole_does_not_stretch_the_grid_of_a_long_chain(masses: int) -> N
     model = chain_with_weak_damper(masses)
     omega = np.asarray(frequency_response(model, None).omega)
     assert omega[-1] == pytest.approx(20.0, rel=0.2)
-    assert omega.size <= MOST_POINTS
+    assert omega.size <= DEFAULT_GRID_MOST_POINTS
     assert np.abs(omega - 2.0 * np.sin(np.pi / (2.0 * masses + 2.0))).min() < 1e-3 * omega[0] * 10.0
 
 

@@ -14,13 +14,13 @@ from halfdof_ctrl.errors import (
     InconsistentStateError,
     ParameterError,
 )
-from halfdof_ctrl.systems.state_map import KINDS, States
+from halfdof_ctrl.systems.state_map import STATE_KINDS, States
 
 ROUNDING = 1e-12  #: relative, of responses of the mount in other states
 TIME = np.linspace(0.0, 2.0, 201)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", STATE_KINDS)
 def test_transfer_function_does_not_depend_on_the_states(kind: States) -> None:
     """Displacements, velocities and accelerations of all DOFs, where these are proper."""
     model = hydromount().select("F_y", ["y", "y_dot", "y_ddot", "y1", "y1_dot", "y2"])
@@ -30,7 +30,7 @@ def test_transfer_function_does_not_depend_on_the_states(kind: States) -> None:
     assert sys.output_labels == list(model.outputs)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", STATE_KINDS)
 def test_initial_state_and_recovered_motion_are_those_of_dof_states(kind: States) -> None:
     """`state` and `recover` give the same free motion, half DOFs and their velocities included."""
     model = hydromount().select("F_y", "y")
@@ -51,7 +51,7 @@ def test_initial_state_and_recovered_motion_are_those_of_dof_states(kind: States
         assert_allclose(motions[0][name], motions[1][name], rtol=0, atol=ROUNDING * size)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", STATE_KINDS)
 def test_static_dofs_follow_the_input(kind: States) -> None:
     """A massless node under a ramp: displacement at once, velocity by the slope of the input."""
     model = mechss(np.diag([1.0, 0]), np.diag([0.5, 0]), [[3, -1], [-1, 2]], dofs=["mass", "node"]).select(
@@ -63,7 +63,7 @@ def test_static_dofs_follow_the_input(kind: States) -> None:
     assert_allclose(motion["node_dot"], (1.0 + motion["mass_dot"]) / 2.0, rtol=ROUNDING)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", STATE_KINDS)
 def test_gains_and_weights_follow(kind: States) -> None:
     """`control.lqr` in any states, carried back, is the gain on DOF states."""
     model = hydromount().select("F_y", "y")
@@ -75,7 +75,7 @@ def test_gains_and_weights_follow(kind: States) -> None:
     assert states.dof_states == dofs.states
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", STATE_KINDS)
 def test_states_of_a_prescribed_motion_contain_the_input(kind: States) -> None:
     """A base that is displaced at the start: the state needs u0, and the mass is where it was said to be."""
     model = hydromount().prescribe_motion("y2", outputs=["y", "R_y2"])
@@ -113,7 +113,7 @@ def test_sparse_models_have_the_same_states() -> None:
     """A sparse copy of the mount, dense inside."""
     mount = hydromount()
     sparse = mechss(csc_array(mount.M), csc_array(mount.C), csc_array(mount.K), dofs=mount.dofs).select("F_y", "y")
-    for kind in KINDS:
+    for kind in STATE_KINDS:
         assert_allclose(mech2ss(sparse, states=kind)(2j), mount.select("F_y", "y")(2j), rtol=ROUNDING)
         assert_allclose(
             state_map(sparse, kind).state({"y": 1.0}), state_map(mount, kind).state({"y": 1.0}), rtol=ROUNDING

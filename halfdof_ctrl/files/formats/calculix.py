@@ -23,7 +23,7 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
 LABEL = re.compile(rb"(\d{1,10})\.(\d{1,2})")
-SHORTEST, LONGEST = b"1.1", 12  #: a name, and characters of one: ten digits, a point and a digit
+CALCULIX_SHORTEST, LONGEST = b"1.1", 12  #: a name, and characters of one: ten digits, a point and a digit
 POINT, TEN = ord("."), 10
 COLUMNS = 3
 
@@ -108,7 +108,7 @@ def _dofs_by_line(content: bytes) -> tuple[str, ...]:
 def _plain_dofs(content: bytes) -> tuple[str, ...] | None:
     """Read names that all are a node, a point and one digit, None if they are not."""
     lines = cut_lines(content)
-    if not lines.starts.size or not ((lines.lengths > len(SHORTEST) - 1) & (lines.lengths <= LONGEST)).all():
+    if not lines.starts.size or not ((lines.lengths > len(CALCULIX_SHORTEST) - 1) & (lines.lengths <= LONGEST)).all():
         return None
     fields = lines.cut_from_the_right(LONGEST)
     components = fields[:, -1] - np.uint8(ord("0"))

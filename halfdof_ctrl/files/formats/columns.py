@@ -17,9 +17,9 @@ Integers = npt.NDArray[np.int64]
 
 IndexArray = npt.NDArray[Any]
 
-NEWLINE, RETURN, BLANK, ZERO = b"\n"[0], b"\r"[0], b" "[0], b"0"[0]
+COLUMNS_NEWLINE, RETURN, BLANK, ZERO = b"\n"[0], b"\r"[0], b" "[0], b"0"[0]
 DECIMAL = 10
-MOST_DIGITS = 18  #: of a whole number that int64 surely holds
+COLUMNS_MOST_DIGITS = 18  #: of a whole number that int64 surely holds
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -76,8 +76,8 @@ def cut_lines(content: bytes) -> CutLines:
     (b'ab cde', [2, 4])
     """
     text = np.frombuffer(content, dtype=np.uint8)
-    ends = np.flatnonzero(text == NEWLINE)
-    if text.size and text[-1] != NEWLINE:
+    ends = np.flatnonzero(text == COLUMNS_NEWLINE)
+    if text.size and text[-1] != COLUMNS_NEWLINE:
         ends = np.append(ends, text.size)
     starts = np.concatenate([[0], ends[:-1] + 1]) if ends.size else ends
     lengths = ends - starts
@@ -127,7 +127,7 @@ def whole_fields(field: Characters) -> Integers:
         is_digit = digits < DECIMAL
         if not any_begun and not is_digit.any() and (characters == BLANK).all():
             continue
-        if place < field.shape[1] - MOST_DIGITS or (begun > is_digit).any():
+        if place < field.shape[1] - COLUMNS_MOST_DIGITS or (begun > is_digit).any():
             return _any_whole(field)
         if not is_digit.all():
             if (is_digit == (characters == BLANK)).any():

@@ -12,8 +12,8 @@ from halfdof_ctrl.base.arrays import EPS
 SAMPLE = 2**16  #: bytes at the start and at the end that are looked at; a file has one format
 NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
 FULL_DIGITS = 16  #: digits from which numbers are as good as float64
-SURE = 6  #: digits from which few numbers of full length tell a format
-FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
+DIGITS_SURE = 6  #: digits from which few numbers of full length tell a format
+DIGITS_FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then
 FEWEST_DIGITS = 4  #: digits of the shortest format that is believed,
 MANY, MOST = 8, 0.5  #: and numbers of full length, and their share, that it takes
 
@@ -31,7 +31,7 @@ def digits_of(content: bytes) -> int | None:
     lengths = [len(mantissa) for mantissa in mantissas if mantissa]
     longest = max(lengths, default=0)
     full = lengths.count(longest)
-    sure = longest >= SURE and full >= max(FEW, SHARE * len(lengths))
+    sure = longest >= DIGITS_SURE and full >= max(DIGITS_FEW, SHARE * len(lengths))
     likely = longest >= FEWEST_DIGITS and full >= max(MANY, MOST * len(lengths))
     return longest if (sure or likely) and longest < FULL_DIGITS else None
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
-from halfdof_ctrl.files.formats.dmig_punch import COMPONENT_BITS, MOST_COMPONENT, extrn_labels, punched_matrices
+from halfdof_ctrl.files.formats.dmig_punch import MOST_COMPONENT, PUNCH_COMPONENT_BITS, extrn_labels, punched_matrices
 from halfdof_ctrl.files.formats.labels import distinct, dof_names
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import printable
@@ -217,7 +217,7 @@ def _key(node: str, component: str) -> int:
     if not 0 < place[0] < LARGEST_NODE or not 0 <= place[1] <= MOST_COMPONENT:
         msg = "no node"
         raise ValueError(msg)
-    return (place[0] << COMPONENT_BITS) + place[1]
+    return (place[0] << PUNCH_COMPONENT_BITS) + place[1]
 
 
 def _real(text: str) -> float:
@@ -242,7 +242,7 @@ def _assembled(
     known = distinct(entries.rows, entries.columns)
     values = entries.values
     declared: Declared = "symmetric" if entries.form == SYMMETRIC else "general"
-    nodes, components = known >> COMPONENT_BITS, known & (2**COMPONENT_BITS - 1)
+    nodes, components = known >> PUNCH_COMPONENT_BITS, known & (2**PUNCH_COMPONENT_BITS - 1)
     labels = known.tobytes()
     if labels not in names:
         names[labels] = dof_names(nodes.tolist(), components.tolist())

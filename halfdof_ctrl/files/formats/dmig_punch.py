@@ -34,11 +34,11 @@ HEADER, COLUMN = b"DMIG    ", b"DMIG*   "  #: first fields of the two kinds of e
 FIELD = 16  #: characters
 LEAD = 8  #: characters before the fields
 FULL_LINE = LEAD + 4 * FIELD
-COMPONENT_BITS, MOST_COMPONENT = 3, 6
-MOST_NODE = 2 ** (63 - COMPONENT_BITS)
-STAR, PLUS, REMARK = ord("*"), ord("+"), ord("$")
+PUNCH_COMPONENT_BITS, MOST_COMPONENT = 3, 6
+MOST_NODE = 2 ** (63 - PUNCH_COMPONENT_BITS)
+STAR, PLUS, DMIG_PUNCH_REMARK = ord("*"), ord("+"), ord("$")
 EXPONENTS = np.frombuffer(AS_PYTHON, dtype=np.uint8)  #: what each character becomes for Python
-EXTRN, SMALL = b"\nEXTRN   ", 8
+DMIG_PUNCH_EXTRN, DMIG_PUNCH_SMALL = b"\nEXTRN   ", 8
 DIGIT = 9
 GOES_ON = np.array([BLANK, PLUS], dtype=np.uint8)  #: first characters of the lines by which an EXTRN entry goes on
 OTHER_MARKS = (b"\t", b",", b"_", b"dmig")  #: of the layouts that are not read here
@@ -67,7 +67,7 @@ def punched_matrices(content: bytes) -> list[PunchedMatrix] | None:
         return None
     lines = cut_lines(content[content.rfind(b"\n", 0, start) + 1 :])
     first = lines.cut(0, 1)[:, 0]
-    kept = first != REMARK
+    kept = first != DMIG_PUNCH_REMARK
     hollow = np.flatnonzero(first == BLANK)  # perhaps empty lines
     kept[hollow] = (lines.cut(0, FULL_LINE, hollow) != BLANK).any(axis=1)
     if not kept.all():
@@ -147,7 +147,7 @@ def _keys(lines: CutLines, start: int, which: Integers) -> Integers:
     if not sound.all():
         msg = "no node"
         raise ValueError(msg)
-    return np.asarray((nodes << COMPONENT_BITS) + components)
+    return np.asarray((nodes << PUNCH_COMPONENT_BITS) + components)
 
 
 def extrn_labels(content: bytes) -> tuple[list[int], list[int]] | None:
@@ -158,16 +158,16 @@ def extrn_labels(content: bytes) -> tuple[list[int], list[int]] | None:
     >>> extrn_labels(b"$ ROWS$\nEXTRN          3     123    1001       0$\n              12       2\nGRID\n")
     ([3, 3, 3, 1001, 12], [1, 2, 3, 0, 2])
     """
-    start = 0 if content.startswith(EXTRN[1:]) else content.find(EXTRN) + 1
-    if not content.startswith(EXTRN[1:], start) or content.find(EXTRN, start) >= 0:
+    start = 0 if content.startswith(DMIG_PUNCH_EXTRN[1:]) else content.find(DMIG_PUNCH_EXTRN) + 1
+    if not content.startswith(DMIG_PUNCH_EXTRN[1:], start) or content.find(DMIG_PUNCH_EXTRN, start) >= 0:
         return None
     characters = cut_lines(content[start:]).cut(0, FULL_LINE)
-    more = np.isin(characters[1:, 0], GOES_ON) | (characters[1:, 0] == REMARK)
+    more = np.isin(characters[1:, 0], GOES_ON) | (characters[1:, 0] == DMIG_PUNCH_REMARK)
     characters = characters[: 1 + int(np.argmin(np.append(more, False)))]
-    remark = characters == REMARK
+    remark = characters == DMIG_PUNCH_REMARK
     if remark.any():
         characters = np.where(np.maximum.accumulate(remark, axis=1), np.uint8(BLANK), characters)
-    fields = np.ascontiguousarray(characters[:, LEAD:]).reshape(-1, 2, SMALL)
+    fields = np.ascontiguousarray(characters[:, LEAD:]).reshape(-1, 2, DMIG_PUNCH_SMALL)
     fields = fields[(fields != BLANK).any(axis=(1, 2))]
     marks = fields[:, 1] != BLANK
     digits = fields[:, 1][marks] - np.uint8(ord("0"))

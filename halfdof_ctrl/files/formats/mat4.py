@@ -23,12 +23,12 @@ from halfdof_ctrl.files.formats.variables import Value, Variable
 
 MAT4_HEADER = 20  #: bytes of the five integers
 PRECISIONS = ("f8", "f4", "i4", "i2", "u2", "u1")
-FULL, TEXT, SPARSE = 0, 1, 2
+FULL, TEXT, MAT4_SPARSE = 0, 1, 2
 BIG_ENDIAN = 1000
 MOST_TYPE = 5000
 LONGEST_NAME = 64
 VARIABLE_NAME = re.compile(rb"[A-Za-z]\w*\Z")
-TRIPLET = 3
+TRIPLET_COLUMNS = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,7 @@ def _header(content: bytes, place: int) -> _Header | None:
             0 <= kind < MOST_TYPE
             and big == (order == ">")
             and precision < len(PRECISIONS)
-            and what in {FULL, TEXT, SPARSE}
+            and what in {FULL, TEXT, MAT4_SPARSE}
             and rows >= 0
             and columns >= 0
             and is_complex in {0, 1}
@@ -103,7 +103,7 @@ def _header(content: bytes, place: int) -> _Header | None:
 
 
 def _shape(content: bytes, header: _Header) -> tuple[int, ...]:
-    if header.kind != SPARSE or header.shape[0] < 1 or header.shape[1] < TRIPLET:
+    if header.kind != MAT4_SPARSE or header.shape[0] < 1 or header.shape[1] < TRIPLET_COLUMNS:
         return header.shape
     last = _table(content, header)[0][-1, :2]
     return tuple(np.nan_to_num(last).astype(np.int64).tolist()) if np.abs(last).max() < MOST_ROWS else header.shape
@@ -122,7 +122,7 @@ def _read(content: bytes, header: _Header) -> Value:
     real, imaginary = _table(content, header)
     if header.kind == TEXT:
         return ["".join([chr(int(unit)) for unit in row]).rstrip(" ") for row in real.tolist()]
-    if header.kind == SPARSE:
+    if header.kind == MAT4_SPARSE:
         return _sparse(header.name, real)
     return real if imaginary is None else real + 1j * imaginary
 
@@ -130,10 +130,10 @@ def _read(content: bytes, header: _Header) -> Value:
 def _sparse(name: str, table: npt.NDArray[Any]) -> csc_array:
     """Read rows of (row, column, value) or (row, column, real, imaginary); the last one tells the size."""
     rows, columns = table.shape
-    last = table[-1, :2] if rows and columns >= TRIPLET else np.array([-1.0, -1.0])
+    last = table[-1, :2] if rows and columns >= TRIPLET_COLUMNS else np.array([-1.0, -1.0])
     places = table[:-1, :2] - 1.0
     sound = (
-        columns in {TRIPLET, TRIPLET + 1}
+        columns in {TRIPLET_COLUMNS, TRIPLET_COLUMNS + 1}
         and bool(np.isfinite(table).all())
         and bool((last >= 0).all() and (last <= MOST_ROWS).all())
         and bool((places >= 0).all() and (places < last).all() and (places == np.rint(places)).all())
@@ -141,7 +141,7 @@ def _sparse(name: str, table: npt.NDArray[Any]) -> csc_array:
     if not sound:
         msg = f"the sparse matrix {name} has indices out of bounds. The file is damaged."
         raise FileFormatError(msg, path="")
-    values = table[:-1, 2] + 1j * table[:-1, 3] if columns > TRIPLET else table[:-1, 2]
+    values = table[:-1, 2] + 1j * table[:-1, 3] if columns > TRIPLET_COLUMNS else table[:-1, 2]
     shape = (int(last[0]), int(last[1]))
     i, j = places.astype(np.int64).T
     return csc_array(coo_array((values, (i, j)), shape=shape))

@@ -40,7 +40,7 @@ MATRIX, COMPRESSED = 14, 15
 NUMBER_TYPES = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 TEXT_ENCODINGS = {16: "utf-8", 17: "utf-16", 18: "utf-32"}
 CELL, STRUCT, CHAR, SPARSE, OPAQUE = 1, 2, 4, 5, 17
-DEEPEST = 4  #: structs in structs that are looked into
+DEEPEST_NESTING = 4  #: structs in structs that are looked into
 NUMERIC = range(6, 16)
 COMPLEX_FLAG, LOGICAL_FLAG = 0x800, 0x200
 
@@ -108,7 +108,7 @@ def _described(kind: int, data: bytes, order: str) -> Variable:
         whole = _variable(*(_inflated(head.name, data, order) if packed else (kind, data)), order)
         return _Head.of(whole), whole
 
-    return _as_variable(head.name, head, body, DEEPEST)
+    return _as_variable(head.name, head, body, DEEPEST_NESTING)
 
 
 def _as_variable(name: str, head: "_Head", body: Callable[[], "tuple[_Head, _Bytes]"], depth: int) -> Variable:

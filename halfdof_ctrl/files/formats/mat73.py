@@ -33,7 +33,7 @@ from halfdof_ctrl.files.formats.variables import (
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 USER_BLOCK = 512  #: bytes that MATLAB puts before it
-EXTRA = "hdf5"
+HDF5_EXTRA = "hdf5"
 MOST_DEPTH = 4  #: structs in structs that are looked into
 OWN = "#"  #: begins the names of groups that MATLAB keeps for itself
 REAL_KINDS = "biuf"
@@ -161,10 +161,10 @@ def _h5py() -> Any:  # noqa: ANN401  # a module that need not be there
         return importlib.import_module("h5py")
     except ImportError as cause:
         msg = (
-            f"this is a MATLAB 7.3 (HDF5) file, which needs h5py: pip install 'halfdof_ctrl[{EXTRA}]'. Or save it "
+            f"this is a MATLAB 7.3 (HDF5) file, which needs h5py: pip install 'halfdof_ctrl[{HDF5_EXTRA}]'. Or save it "
             "with  save(file, ..., '-v7')."
         )
-        raise MissingExtraError(msg, path="", extra=EXTRA) from cause
+        raise MissingExtraError(msg, path="", extra=HDF5_EXTRA) from cause
 
 
 def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN401  # h5py is untyped

@@ -15,7 +15,7 @@ from scipy.sparse import coo_array, csc_array
 from halfdof_ctrl.files.formats.variables import most_unpacked, out_of_room
 
 PIECE = 2**20  #: bytes that are unpacked at once
-LARGEST = 2**31  #: bytes in all, 16 000 x 16 000 numbers, which take seconds to look through
+MOSTLY_ZEROS_LARGEST = 2**31  #: bytes in all, 16 000 x 16 000 numbers, which take seconds to look through
 
 
 def without_zeros(
@@ -50,7 +50,7 @@ def without_zeros(
     2
     """
     count = math.prod(shape)
-    if len(shape) != 2 or dtype.kind not in "biuf" or count * dtype.itemsize > LARGEST:  # noqa: PLR2004  # a plane
+    if len(shape) != 2 or dtype.kind not in "biuf" or count * dtype.itemsize > MOSTLY_ZEROS_LARGEST:  # noqa: PLR2004  # a plane
         raise out_of_room(name, count * dtype.itemsize, length)
     places: list[npt.NDArray[np.int64]] = []
     values: list[npt.NDArray[np.float64]] = []

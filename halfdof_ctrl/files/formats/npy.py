@@ -39,7 +39,7 @@ NPY_HEADER = re.compile(
 RECORDS = re.compile(r"\s*\{\s*'descr'\s*:\s*\[")  #: a structured array
 NUMBERS, TEXTS = "biufc", "US"
 SPARSE_PARTS = ("data", "indices", "indptr", "shape")
-COMPRESSED = {"csc": csc_array, "csr": csr_array}
+COMPRESSED_ARRAYS = {"csc": csc_array, "csr": csr_array}
 SAVED_SPARSE = {"format", "shape", "data"}  #: members that scipy.sparse.save_npz writes always
 UNREADABLE = "objects, which would have to be unpickled (allow_pickle=False here), and that can run code"
 
@@ -202,7 +202,7 @@ def _saved_sparse(found: dict[str, Variable]) -> Variable:
     kind = layout.decode("latin-1") if isinstance(layout, bytes) else str(layout)
 
     def read() -> Value:
-        if kind in COMPRESSED:
+        if kind in COMPRESSED_ARRAYS:
             return _compressed(kind, "", *(found[part].read() for part in SPARSE_PARTS))
         if kind != "coo":
             msg = f"a sparse matrix in the layout {kind!r}. Save K.tocsc()."
@@ -222,7 +222,9 @@ def _saved_sparse(found: dict[str, Variable]) -> Variable:
 def _said_shape(shape: Variable) -> tuple[int, ...]:
     sizes = np.asarray(shape.read()) if shape.kind == "matrix" and len(shape.shape) == 1 else np.zeros(0)
     return (
-        tuple([int(size) for size in sizes]) if sizes.size == len(COMPRESSED) and sizes.dtype.kind in "iu" else (0, 0)
+        tuple([int(size) for size in sizes])
+        if sizes.size == len(COMPRESSED_ARRAYS) and sizes.dtype.kind in "iu"
+        else (0, 0)
     )
 
 
@@ -252,7 +254,7 @@ def _compressed(kind: str, key: str, data: Any, indices: Any, indptr: Any, shape
     if not sound:
         raise _out_of_bounds(key)
     parts = (np.array(data), np.array(indices), np.array(indptr))  # the bytes of a file cannot be written to
-    matrix = csc_array(COMPRESSED[kind](parts, shape=(rows, columns)))
+    matrix = csc_array(COMPRESSED_ARRAYS[kind](parts, shape=(rows, columns)))
     matrix.sum_duplicates()
     return matrix
 

@@ -39,7 +39,7 @@ from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled
 from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
 
-COMPLEX_TYPES, DOUBLE_TYPES, TYPES = (3, 4), (2, 4), range(1, 5)
+OP4_COMPLEX_TYPES, DOUBLE_TYPES, OP4_TYPES = (3, 4), (2, 4), range(1, 5)
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
 NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
@@ -62,7 +62,7 @@ class _Matrix:
     @property
     def per_value(self) -> int:
         """Real numbers of a value."""
-        return 2 if self.type in COMPLEX_TYPES else 1
+        return 2 if self.type in OP4_COMPLEX_TYPES else 1
 
     def add(self, column: int, row: int, count: int) -> None:
         """Note where the next values belong, `column` and `row` counted from one."""
@@ -139,7 +139,7 @@ def read_output4(content: bytes, room: int = MOST_ROWS) -> list[RawMatrix]:
 
 def _opened(numbers: tuple[int, ...], name: str, room: int) -> _Matrix:
     columns, rows, form, kind = numbers
-    sound = 0 < columns <= room and 0 < abs(rows) <= room and kind in TYPES
+    sound = 0 < columns <= room and 0 < abs(rows) <= room and kind in OP4_TYPES
     if not sound:
         msg = f"a header with {columns} columns, {rows} rows and type {kind}. {DAMAGED}"
         raise FileFormatError(msg, path="")

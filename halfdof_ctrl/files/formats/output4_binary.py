@@ -19,7 +19,7 @@ from halfdof_ctrl.files.formats.columns import runs
 Views = tuple[tuple["array[int]", "array[int]"], int]  #: words from even and odd quarters on, and a shift
 
 RECORD_MARK = 4  #: bytes of a record's length, and of a quarter
-HALF, HALF_MASK = 16, 0xFFFF  #: bits of the row in a word that holds length and row
+OUTPUT4_BINARY_HALF, HALF_MASK = 16, 0xFFFF  #: bits of the row in a word that holds length and row
 CUT = "it ends within a matrix. The file is cut short."
 DAMAGED = "The file is damaged."
 
@@ -163,7 +163,7 @@ def _follow(
         if row <= 0:
             packed = (odd if data & 1 else even)[data >> shift]
             data += step
-            length, row_here = (packed >> HALF) - 1, packed & HALF_MASK
+            length, row_here = (packed >> OUTPUT4_BINARY_HALF) - 1, packed & HALF_MASK
             if matrix.big:
                 length, row_here = packed - 1, (odd if data & 1 else even)[data >> shift] if data < end else 0
                 data += step

@@ -30,7 +30,7 @@ DIGITS_ALONE = re.compile(rb"\d+")
 DECIMAL_COMMA = re.compile(rb"(?<=\d),(?=\d)")
 TABLE_HEAD = 2**16  #: bytes in which the first line of data must stand
 TABLE_SYMMETRY = 1e-9  #: of the largest entry
-TRIPLET, LABELLED = 3, 5  #: numbers of a line that may be places and a value
+TRIPLET, LABELLED_TABLE = 3, 5  #: numbers of a line that may be places and a value
 SIZES_LINE = 3  #: numbers of a line of sizes
 LONG = 64  #: lines above which a table of so few columns is no square matrix
 
@@ -86,10 +86,10 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
     layout = _layout(content)
     plain = _plain(content, layout)
     bare = not (dense or layout.labelled or layout.titles)
-    if bare and plain.count(b"\n", 0, TABLE_HEAD) > LONG and layout.columns in {TRIPLET, LABELLED}:
+    if bare and plain.count(b"\n", 0, TABLE_HEAD) > LONG and layout.columns in {TRIPLET, LABELLED_TABLE}:
         return _long_by_place(plain, layout.columns, most_rows)
     table, names = _numbers(plain, layout)
-    if bare and table.shape[1] in {TRIPLET, LABELLED}:
+    if bare and table.shape[1] in {TRIPLET, LABELLED_TABLE}:
         by_place = _by_place(plain, table, most_rows)
         if by_place is not None:
             return by_place
@@ -177,7 +177,7 @@ def _by_place(plain: bytes, table: FloatArray, most_rows: int) -> RawMatrix | No
     plain = _without_remarks(plain)
     places = table[:, :-1]
     if (places != np.rint(places)).any() or (columns == TRIPLET and (places < 0).any()):
-        return None if rows == columns or columns != LABELLED else _refuse_places(table)
+        return None if rows == columns or columns != LABELLED_TABLE else _refuse_places(table)
     if _is_size_line(table):
         raise _size_line_error(table[0], rows - 1)
     if rows != columns:

@@ -18,7 +18,7 @@ BOM = b"\xef\xbb\xbf"  #: begins text that Windows wrote as UTF-8
 LONGEST_LINE = 1024  #: characters of a line of fixed fields; Fortran's own limit is 132
 TEXT_BLOCK = 2**25  #: bytes that are parsed at once
 AS_PYTHON = bytes.maketrans(b",;DdQq\t\r", b"  EeEe  ")
-NEWLINE, BLANK = 10, 32  #: bytes; what is not above the second cannot be seen
+NEWLINE, BLANK_BYTES = 10, 32  #: bytes; what is not above the second cannot be seen
 TAIL = 4096  #: bytes at the end of a text that are looked at
 FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
 WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
@@ -187,7 +187,7 @@ class Lines:
         if lengths.size and lengths[0] > full and (lengths == lengths[0]).all():  # alike, so cut in one piece
             text = self.content[self._start(first) : int(self.ends[stop - 2]) + 1].translate(AS_PYTHON)
             table = np.frombuffer(text, dtype=np.uint8).reshape(lengths.size, int(lengths[0]))
-            if (table[:, full:] > BLANK).any():
+            if (table[:, full:] > BLANK_BYTES).any():
                 raise ValueError(TOO_LONG)
             alike = _parsed(np.ascontiguousarray(table[:, :full]).reshape(-1).view(f"S{width}"))
             last = fixed_width([self[stop - 1]], width, per_line, [count - alike.size])

@@ -31,8 +31,8 @@ NEXT_MODE_RATIO = 1e3  #: the ratio (25) of the next mode is larger than that of
 NEARLY_FREE = 30.0  #: times eps: a ratio (25) up to which rounding of K changes the motion visibly
 FIRST_PREFERRED = 1e-3  #: DOFs that come first are preferred as supports by so much, so that rounding does not choose
 SURELY_DEFINITE = 1e-10  #: reciprocal condition number from which on rounding does not decide about definiteness
-INVERSE_ITERATIONS = 8
-REFINEMENTS = 2
+RIGID_ITERATIONS = 8
+RIGID_REFINEMENTS = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -214,7 +214,7 @@ def _with_supports(K: FloatArray, supports: IndexArray, factor: FloatArray) -> S
     motions[supports] = np.eye(supports.size)
     held = -solved(factor, across)
     exact = sliced(inner)
-    for _ in range(REFINEMENTS):
+    for _ in range(RIGID_REFINEMENTS):
         held += solved(factor, solved(factor, exact_residual(-beside, exact, held), transposed=True))
     motions[carried] = held
     U = np.zeros((carried.size, len(K)))
@@ -257,7 +257,7 @@ def _next_ratio(K: FloatArray, exact: SlicedMatrix, factor: StiffnessFactor) -> 
         return np.inf
     U, basis = factor.U[:, carried], np.linalg.qr(factor.motions)[0]
     x = np.random.default_rng(0).standard_normal((len(K), 1))
-    for _ in range(INVERSE_ITERATIONS):
+    for _ in range(RIGID_ITERATIONS):
         x -= basis @ (basis.T @ x)
         held = np.zeros_like(x)
         held[carried] = solved(U, solved(U, x[carried], transposed=True))

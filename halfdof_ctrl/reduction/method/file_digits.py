@@ -17,7 +17,9 @@ from halfdof_ctrl.base.errors import CloseDecisionWarning, DataLimitWarning, giv
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-ZERO = 16 * EPS  #: times the size: to what an eigenvalue is computed; one below that is zero whatever the digits
+FILE_DIGITS_ZERO = (
+    16 * EPS
+)  #: times the size: to what an eigenvalue is computed; one below that is zero whatever the digits
 MOVES = 0.1  #: part of the largest entry of a vector from which on a DOF is named
 
 
@@ -64,7 +66,7 @@ def undetermined(X: FloatArray, known_to: float) -> Undetermined | None:
         return None
     values, vectors = scipy.linalg.eigh(scaled)
     bounds = known_to * np.einsum("ik,ij,jk->k", np.abs(vectors), np.abs(scaled), np.abs(vectors), optimize=True)
-    unclear = (np.abs(values) <= bounds) & (np.abs(values) > ZERO * rows.size * reach)
+    unclear = (np.abs(values) <= bounds) & (np.abs(values) > FILE_DIGITS_ZERO * rows.size * reach)
     if not unclear.any():
         return None
     directions = np.zeros((len(X), np.count_nonzero(unclear)))

@@ -26,17 +26,17 @@ from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.signals import Signal
 
-FEW_STATES = 60  #: up to which all eigenvalues are computed to choose the frequencies
+ALL_EIGENVALUES = 60  #: up to which all eigenvalues are computed to choose the frequencies
 SLOW_MODES = 6  #: of more states, that are looked for
 SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
-MOST_POINTS = 4  #: frequencies at which the loss is measured
+MOST_FREQUENCIES = 4  #: frequencies at which the loss is measured
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are looked for if A is singular
-ROUNDINGS = 2  #: of M, C, K at random
+TRIED_ROUNDINGS = 2  #: of M, C, K at random
 ZERO_CHANNEL = 100.0  #: times what these change in it: a smaller channel is zero
-SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
+LOSS_SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,14 +117,14 @@ def loss_points(A: FloatArray) -> ComplexArray:
     moving = poles[np.abs(poles) > bounds]
     moving = moving[np.argsort(np.abs(moving))]
     swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
-    chosen = np.concatenate([swinging[: MOST_POINTS - 1], real[:1]])
+    chosen = np.concatenate([swinging[: MOST_FREQUENCIES - 1], real[:1]])
     return np.asarray(1j * BESIDE_MODE * (chosen if chosen.size else np.ones(1)))
 
 
 def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Return all eigenvalues of a small matrix or the smallest ones, and up to which size they may be zero."""
     N = len(A)
-    if N <= FEW_STATES:
+    if N <= ALL_EIGENVALUES:
         poles, rounding = eigenvalues_and_rounding(A)
         return poles, rounding + AT_ORIGIN * np.abs(poles).max(initial=0.0)
     matrix, _ = balanced_states(A)
@@ -169,7 +169,7 @@ def _lost_at(
     missed = np.asarray(value - said + _seen(model, s, stored.answer(states, rest)))
     terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate(model.quadratics.P))
     generator = np.random.default_rng(0)
-    rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(ROUNDINGS)]
+    rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(TRIED_ROUNDINGS)]
     data = [np.abs(_seen(model, s, stored.answer(states, force.astype(np.complex128)))) for force in rounded]
     return np.abs(missed), np.abs(value), ZERO_CHANNEL * np.max(data, axis=0)
 
@@ -247,5 +247,5 @@ def _at(coefficients: Sequence[Matrix], s: complex, columns: IndexArray) -> Comp
 
 def _as_it_is(matrix: Matrix) -> Matrix:
     """Return a dense matrix with few entries as a sparse one."""
-    few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size
+    few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < LOSS_SPARSE_SHARE * matrix.size
     return csc_array(matrix) if few else matrix

@@ -24,7 +24,7 @@ from halfdof_ctrl.reduction.method.units import ScaledRows, Units, scaled_rows
 
 NEAR_POINTS = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
 RATIO_DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
-SINGULAR_PENCIL = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
+SINGULAR_AT_POINTS = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
 AXIS_POINTS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
 SOLVE_DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
 
@@ -53,7 +53,7 @@ class ScaledPencil:
 
     def is_singular(self) -> bool:
         """Whether P(s) is singular to working precision at all points."""
-        return all(self._smallest(s) <= SINGULAR_PENCIL * self.P.shape[1] for s in NEAR_POINTS)
+        return all(self._smallest(s) <= SINGULAR_AT_POINTS * self.P.shape[1] for s in NEAR_POINTS)
 
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""

@@ -20,7 +20,7 @@ from halfdof_ctrl.base.sparse_arrays import IndexArray, SparseMatrix
 from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
-from halfdof_ctrl.reduction.modal.slices import MOST, modes_by_slices
+from halfdof_ctrl.reduction.modal.slices import MODES_IN_SLICE, modes_by_slices
 
 FEW_MASSES = 400  #: DOFs with mass up to which all modes are found from the flexibility at them
 SOFT = 1e-3  #: of the smallest K_jj / M_jj: the shift where K is singular ...
@@ -121,7 +121,7 @@ def lowest_modes(stiffness: ShiftedStiffness, count: int) -> Modes:
         return Modes(np.zeros(0), np.zeros((stiffness.K.shape[0], 0)))
     if massive.size <= max(FEW_MASSES, 3 * count):
         return _all_modes(stiffness, massive, count)
-    if count > MOST:
+    if count > MODES_IN_SLICE:
         return _sorted(*modes_by_slices(stiffness.K, stiffness.M, count))
     n = stiffness.K.shape[0]
     inverse = LinearOperator((n, n), matvec=lambda v: stiffness.solve(v.reshape(n, 1))[:, 0], dtype=np.float64)

@@ -24,9 +24,12 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
-LOWEST, HIGHEST = 8, 32  #: resonances of the band that are checked in any case: errors grow towards its end ...
+LOWEST, RESONANCE_ERROR_HIGHEST = (
+    8,
+    32,
+)  #: resonances of the band that are checked in any case: errors grow towards its end ...
 CHECKED_SIZE = 2**26  #: ... and all others while DOFs times resonances are fewer
-FLOOR = 2.0  #: times u: half of what rounds the entries of K, the sums that they are, and the energy
+RESONANCE_ERROR_FLOOR = 2.0  #: times u: half of what rounds the entries of K, the sums that they are, and the energy
 POLES_TOGETHER = 0.01  #: relative distance of poles that are improved together
 LARGEST_GROUP = 12  #: poles that are improved together at most
 POLE_ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
@@ -72,7 +75,7 @@ def resonance_errors(
     poles, vectors = _resonances(small, band)
     in_band = poles.size
     chosen = np.arange(poles.size)
-    most = max(LOWEST + HIGHEST, CHECKED_SIZE // basis.shape[0])
+    most = max(LOWEST + RESONANCE_ERROR_HIGHEST, CHECKED_SIZE // basis.shape[0])
     if poles.size > most:
         chosen = np.concatenate([chosen[:LOWEST], chosen[LOWEST - most :]])
     poles, vectors = poles[chosen], vectors[:, chosen]
@@ -84,7 +87,11 @@ def resonance_errors(
         w = shapes[:, k]
         stiff: Any = parts["K"] @ w
         energy = abs(complex(w @ stiff))
-        floor.append(FLOOR * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy if energy else 0.0)
+        floor.append(
+            RESONANCE_ERROR_FLOOR * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy
+            if energy
+            else 0.0
+        )
     return ResonanceErrors(
         frequencies=np.abs(poles) / (2.0 * np.pi),
         frequency_shift=np.abs(np.abs(found) - np.abs(poles)) / np.abs(found),

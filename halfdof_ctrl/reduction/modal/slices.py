@@ -16,13 +16,13 @@ from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
 
-MOST = 60  #: modes of a slice
+MODES_IN_SLICE = 60  #: modes of a slice
 SPARE = 4  #: modes that are asked for beyond a slice, so that its ends are not the last to converge
 NARROW = 1e-7  #: relative width of a slice that is not cut further
 OFFSET = 0.013  #: of a slice's width: its shift lies so far off the middle, where symmetric spectra have a mode
-BELOW = 1e-3  #: of the smallest stiffness over mass: so far below zero the first slice begins
+SLICES_BELOW = 1e-3  #: of the smallest stiffness over mass: so far below zero the first slice begins
 CUTS = 60  #: of an interval, until the frequency is found that the wanted number of modes lies below
-PLACES = (0.513, 0.487, 0.531, 0.469, 0.557, 0.443)  #: parts of a slice at which it may be cut
+SLICE_PLACES = (0.513, 0.487, 0.531, 0.469, 0.557, 0.443)  #: parts of a slice at which it may be cut
 FAR_APART = 4.0  #: ratio of the ends of a slice from which it is cut at a mean of logarithms
 GROWTH = 1e4  #: of the largest entry in an elimination without interchanges: beyond, a count of its pivots is in doubt
 NUDGES = (0.0, 1.7e-6, 1.3e-5, 1.1e-4, 1.1e-3, 1.1e-2)  #: relative moves away from where a count is in doubt
@@ -60,7 +60,7 @@ def modes_by_slices(K: SparseMatrix, M: SparseMatrix, count: int) -> tuple[Float
             continue
         is_narrow = stop - start <= NARROW * max(abs(stop), abs(start))
         found = None
-        if above - below <= MOST or is_narrow:
+        if above - below <= MODES_IN_SLICE or is_narrow:
             found = _in_slice(K, M, (start, stop), above - below)
         if found is not None:
             squares.append(found[0])
@@ -84,7 +84,7 @@ def _ends(K: SparseMatrix, M: SparseMatrix, count: int) -> tuple[tuple[float, in
     stiffness, mass = np.abs(K.diagonal()), M.diagonal()
     speeds = stiffness[mass > 0.0] / mass[mass > 0.0]
     positive = speeds[speeds > 0.0]
-    low = _sound(K, M, -BELOW * float(positive.min(initial=1.0)))
+    low = _sound(K, M, -SLICES_BELOW * float(positive.min(initial=1.0)))
     high = _sound(K, M, float(positive.max(initial=1.0)))
     for _ in range(CUTS):
         if high[1] >= count:
@@ -102,7 +102,7 @@ def _ends(K: SparseMatrix, M: SparseMatrix, count: int) -> tuple[tuple[float, in
             start = middle[0]
         else:
             high = middle
-        if count <= high[1] <= count + MOST or high[0] <= start * (1.0 + NARROW):
+        if count <= high[1] <= count + MODES_IN_SLICE or high[0] <= start * (1.0 + NARROW):
             break
     return low, high
 
@@ -125,7 +125,7 @@ def _cut(K: SparseMatrix, M: SparseMatrix, ends: tuple[float, int, float, int]) 
     start, below, stop, above = ends
     even = start <= 0.0 or stop < FAR_APART * start
     best = 0.5 * (start + stop), (below + above) // 2, np.inf
-    for part in PLACES:
+    for part in SLICE_PLACES:
         middle = start + part * (stop - start) if even else float(start ** (1.0 - part) * stop**part)
         count, growth = _inertia(K, M, middle)
         if below <= count <= above and growth < best[2]:

@@ -18,12 +18,12 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.sparse_evaluation import SparseTransfer
 
-MOST_CHANNELS = 4  #: whose zeros are looked at
+ZERO_ERROR_MOST_CHANNELS = 4  #: whose zeros are looked at
 MOST_ZEROS = 12  #: of a channel, those nearest to the end of the band
-ZERO_EFFORT = 4e8  #: channels times cubed size of their pencils that this may take
+ZERO_ERROR_ZERO_EFFORT = 4e8  #: channels times cubed size of their pencils that this may take
 LIGHT_ZERO = 0.1  #: damping ratio of what is no notch
 SLOPE_STEP = 1e-6  #: of a zero: step of a difference quotient
-BESIDE_POLE = 1e-4  #: relative slope that tells a zero from one that a pole cancels
+ZERO_ERROR_BESIDE_POLE = 1e-4  #: relative slope that tells a zero from one that a pole cancels
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -60,9 +60,9 @@ def zero_errors(
         [Hz].
     """
     p, m = small.D.shape
-    channels = [(i, j) for i in range(p) for j in range(m)][:MOST_CHANNELS]
+    channels = [(i, j) for i in range(p) for j in range(m)][:ZERO_ERROR_MOST_CHANNELS]
     rows: list[tuple[float, float, float]] = []
-    if len(channels) * (2.0 * len(small.dofs) + 1.0) ** 3 > ZERO_EFFORT:
+    if len(channels) * (2.0 * len(small.dofs) + 1.0) ** 3 > ZERO_ERROR_ZERO_EFFORT:
         channels = []
     for i, j in channels:
         channel = small.select(small.inputs[j], small.outputs[i])
@@ -71,7 +71,7 @@ def zero_errors(
             values = channel(steps, squeeze=False)[0, 0]
             slope = abs(values[2] - values[0]) / (2.0 * SLOPE_STEP)
             distance = float((np.abs(poles - zero) / abs(zero)).min(initial=np.inf))
-            if not np.isfinite(slope) or slope == 0.0 or distance < BESIDE_POLE:
+            if not np.isfinite(slope) or slope == 0.0 or distance < ZERO_ERROR_BESIDE_POLE:
                 continue
             found = full.at(zero)[i, j] - values[1]
             if np.isfinite(found):

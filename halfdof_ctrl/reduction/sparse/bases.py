@@ -23,7 +23,7 @@ from halfdof_ctrl.reduction.sparse.partition import (
     linked_columns,
 )
 
-LARGEST_BLOCK = 1000  #: columns of a connected part of M or C whose rank is decided by a singular value decomposition
+LARGEST_MIXED = 1000  #: columns of a connected part of M or C whose rank is decided by a singular value decomposition
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +98,7 @@ def _null_split(
     mixtures: list[_Mixture] = []
     evidence: list[RankDecision] = []
     for block in linked_columns(product, np.flatnonzero(filled)):
-        if block.size > LARGEST_BLOCK:
+        if block.size > LARGEST_MIXED:
             raise _block_error(letter, block, dofs)
         rows, own, sizes = _dense_block(span, block)
         linked = product[:, block]
@@ -141,7 +141,7 @@ def _block_error(letter: str, block: IndexArray, dofs: tuple[str, ...]) -> Model
     names = listed([dofs[index] for index in block.tolist()])
     msg = (
         f"W is singular by null columns, and {letter} connects {block.size} DOFs ({names}): whether it has full rank "
-        f"there can be decided for up to {LARGEST_BLOCK} DOFs only. If it is a consistent mass, lump it, or take "
+        f"there can be decided for up to {LARGEST_MIXED} DOFs only. If it is a consistent mass, lump it, or take "
         "truncate_modes."
     )
-    return ModelSizeError(msg, size=block.size, limit=LARGEST_BLOCK)
+    return ModelSizeError(msg, size=block.size, limit=LARGEST_MIXED)

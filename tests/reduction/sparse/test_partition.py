@@ -106,7 +106,7 @@ def test_mass_ratios_are_the_dense_ones(case: tuple[Structure, SecondOrderModel]
 
 def test_a_large_connected_mass_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """No singular value decomposition of the whole structure."""
-    monkeypatch.setattr(bases, "LARGEST_BLOCK", 3)
+    monkeypatch.setattr(bases, "LARGEST_MIXED", 3)
     M = csc_array(np.ones((4, 4)))
     with pytest.raises(ModelSizeError, match=r"M connects 4 DOFs \(q0, q1, q2, q3\)") as caught:
         sparse_bases(mechss(M, None, csc_array(np.eye(4))))
