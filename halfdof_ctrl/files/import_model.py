@@ -11,7 +11,7 @@ from typing import Any, TypeAlias
 
 from halfdof_ctrl.base.arrays import EPS
 from halfdof_ctrl.base.definiteness import LARGEST_COMPONENT
-from halfdof_ctrl.base.doors import is_choice, require_path, shown
+from halfdof_ctrl.base.doors import answer_of, is_choice, require_path, shown
 from halfdof_ctrl.base.errors import (
     FileFormatError,
     ImportedModelWarning,
@@ -43,7 +43,8 @@ def import_model(
     matrices: Mapping[str, str | None] | None,
 ) -> SecondOrderModel | NonlinearModel:
     """Read a model from files, see `models.load_model`."""
-    given = _checked(path, triangle, remove_fixed, matrices)
+    matrices = _plain(matrices, "matrices")
+    given = _checked(_plain(path, "path"), triangle, remove_fixed, matrices)
     found = read_matrices(
         given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=FACTORIZE_NONE
     )
@@ -70,8 +71,16 @@ def import_report(
     largest: int = LARGEST_COMPONENT,
 ) -> ImportReport:
     """Look at the files of a model, see `models.inspect_files`."""
-    given = _checked(path, triangle, remove_fixed, matrices)
+    matrices = _plain(matrices, "matrices")
+    given = _checked(_plain(path, "path"), triangle, remove_fixed, matrices)
     return read_matrices(given, triangle=triangle, remove_fixed=remove_fixed, matrices=matrices, largest=largest).report
+
+
+def _plain(value: Any, parameter: str) -> Any:  # noqa: ANN401  # what users give
+    """Return a mapping as a dictionary, and anything else as it is."""
+    if not isinstance(value, Mapping):
+        return value
+    return answer_of(lambda: dict(value.items()), parameter=parameter, meaning="a mapping, to list what it holds")
 
 
 def _checked(

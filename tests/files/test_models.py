@@ -4,6 +4,7 @@ import csv
 import io
 import os
 import zipfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from halfdof_ctrl import HalfdofError, SecondOrderModel, frequency_response, hydromount, mech2ss, mechss
-from halfdof_ctrl.base.errors import FileFormatError, MatrixError, SignalNameError
+from halfdof_ctrl.base.errors import FileFormatError, MatrixError, ParameterError, SignalNameError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.design.lqr import lqr
-from halfdof_ctrl.files.models import load_model, save_model
+from halfdof_ctrl.files.models import inspect_files, load_model, save_model
 from halfdof_ctrl.files.systems import load_system, save_system
 from halfdof_ctrl.files.tables import save_gain, save_response
 from halfdof_ctrl.files.writing import replacing
@@ -398,3 +399,25 @@ def test_sparse_models_stay_sparse_in_files(ending: str, tmp_path: Path) -> None
             np.testing.assert_array_equal(getattr(loaded, letter).toarray(), getattr(saved, letter).toarray())
         for key in ("dofs", "inputs", "outputs", "prescribed", "name"):
             assert getattr(loaded, key) == getattr(saved, key)
+
+
+class Broken(Mapping[str, str]):
+    """A mapping that fails when it is read."""
+
+    def __getitem__(self, key: str) -> str:
+        msg = "out of order"
+        raise RuntimeError(msg)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(["K"])
+
+    def __len__(self) -> int:
+        return 1
+
+
+def test_a_mapping_that_fails_is_refused_by_the_name_of_its_argument() -> None:
+    """Of paths and of matrices, with what it raised."""
+    with pytest.raises(ParameterError, match=r"path is called as a mapping.*RuntimeError: out of order"):
+        load_model(Broken())
+    with pytest.raises(ParameterError, match=r"matrices is called as a mapping.*RuntimeError: out of order"):
+        inspect_files("model.npz", matrices=Broken())
