@@ -405,13 +405,16 @@ class Broken(Mapping[str, str]):
     """A mapping that fails when it is read."""
 
     def __getitem__(self, key: str) -> str:
+        """Fail."""
         msg = "out of order"
         raise RuntimeError(msg)
 
     def __iter__(self) -> Iterator[str]:
+        """Promise a stiffness."""
         return iter(["K"])
 
     def __len__(self) -> int:
+        """Promise one matrix."""
         return 1
 
 
