@@ -377,7 +377,7 @@ def test_info_takes_a_folder_and_no_time_for_large_pencils(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """QZ of thousands of DOFs takes hours."""
-    monkeypatch.setattr("halfdof_ctrl.commands.LARGEST_PENCIL", 2)
+    monkeypatch.setattr("halfdof_ctrl.commands.LARGEST_PRINTED", 2)
     Path("exported").mkdir()
     Path("exported/K.mtx").write_text(matrix_market(K))
     assert main(["info", "exported"]) == 0

@@ -17,6 +17,8 @@ from numpy.testing import assert_array_equal
 from halfdof_ctrl import sweep
 from support import sweepcases
 
+pytestmark = pytest.mark.processes
+
 COUNT = 60
 SECONDS = 0.04  #: that a case takes
 MPI_SCRIPT = """

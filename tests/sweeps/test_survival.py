@@ -19,6 +19,8 @@ from halfdof_ctrl import hydromount, sweep
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError, WorkerError
 from support import sweepcases
 
+pytestmark = pytest.mark.processes
+
 COUNT = 40
 SQUARES = np.arange(COUNT) ** 2
 PATIENCE = 120.0  #: [s] that a test waits for what must come, on however slow a machine
@@ -200,8 +202,9 @@ def test_workers_that_are_killed_from_outside_lose_nothing(tmp_path: Path) -> No
     assert_array_equal(np.asarray(result.values), SQUARES)
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("workers", [0, 2])
+@pytest.mark.parametrize(
+    ("sent", "workers"), [(signal.SIGKILL, 0), (signal.SIGKILL, 2), (signal.SIGTERM, 2), (signal.SIGINT, 0)]
+)
 def test_a_parent_that_is_killed_leaves_a_checkpoint_and_no_processes(
     tmp_path: Path, sent: signal.Signals, workers: int
 ) -> None:

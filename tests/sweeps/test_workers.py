@@ -30,6 +30,8 @@ from halfdof_ctrl.sweeps.waiting import CHUNK_SECONDS, Waiting, Work
 from halfdof_ctrl.sweeps.workers import work_through
 from support import sweepcases
 
+pytestmark = pytest.mark.processes
+
 COUNT = 40
 START = "forkserver" if sys.platform == "linux" else "spawn"  #: the server that the sweep uses is there already
 SQUARES = np.arange(COUNT) ** 2
@@ -235,7 +237,7 @@ def test_ctrl_c_takes_back_what_an_executor_has_not_begun() -> None:
         begun.append(x)
         if x == 3:
             os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(1.1 * CHUNK_SECONDS)  # so that a chunk is one case
+        time.sleep(1.1 * CHUNK_SECONDS if x != 3 else 2.0)  # a chunk is one case; and time to be stopped
         return x
 
     with ThreadPoolExecutor(1) as executor:
