@@ -218,9 +218,8 @@ def run_step(arguments: argparse.Namespace) -> int:
     else:
         with np.errstate(over="ignore", invalid="ignore"):
             plot = step_plot(model, arguments.time, title=model.name)
-        for axes in plot.axes.flat:
-            for line in axes.get_lines():
-                require_finite(line.get_xdata(), line.get_ydata())
+        for line in [line for axes in plot.axes.flat for line in axes.get_lines()]:
+            require_finite(line.get_xdata(), line.get_ydata())
         save_figure(plot, arguments.o)
     return DONE
 
