@@ -34,6 +34,7 @@ from support.beams import cantilever
 from support.benchmark_circuits import hinged_beam, rotor_in_rigid_bearing, two_track_mount
 from support.benchmark_mechanisms import gear_train, seven_body_mechanism
 from support.benchmark_problems import intersection, mobile_manipulator, qep_with_two_infinite_eigenvalues
+from support.slycot_marks import needs_slycot
 from support.structures import Structure, assembly, damped_structures, null_columns, structures
 
 #: the check itself measures what python-control's evaluation loses
@@ -358,6 +359,7 @@ def test_double_eigenvalue_split_by_rounding_is_none() -> None:
         assert (compare_poles(model, poles, twice, np.zeros(2), 1.0).grade != Grade.FAILED) is passes
 
 
+@needs_slycot
 def test_three_things_are_told_apart_on_a_beam() -> None:
     """40 elements: the state space is right to what its doubles allow, python-control's evaluation of it is not."""
     model = cantilever(40)

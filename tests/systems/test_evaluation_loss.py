@@ -12,11 +12,12 @@ from halfdof_ctrl.systems.evaluation_loss import WARNED, evaluation_loss, is_eve
 from halfdof_ctrl.systems.state_space import system_of_model
 from halfdof_ctrl.systems.transfer_check import system_response
 from support.beams import cantilever
+from support.slycot_marks import needs_slycot
 
 SIZE = 30.0  # a measured loss is right to this factor: another frequency nearby loses another part of it
 
 
-@pytest.mark.parametrize("elements", [40, 80])
+@pytest.mark.parametrize("elements", [pytest.param(40, marks=needs_slycot), 80])
 def test_beams_are_warned_of_and_the_cure_is_named(elements: int) -> None:
     """A cantilever in DOF states: the frequency, the size and `states="scaled"`, which warns of nothing."""
     with pytest.warns(LostDigitsWarning, match=r'python-control\'s evaluation of them .* states="scaled"'):
