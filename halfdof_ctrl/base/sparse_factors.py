@@ -64,4 +64,24 @@ def has_permutation(matrix: csc_array) -> bool:
         return False
     from scipy.sparse.csgraph import maximum_bipartite_matching  # noqa: PLC0415  # rarely needed
 
-    return bool((maximum_bipartite_matching(csr_array(matrix)) >= 0).all())
+    return bool((maximum_bipartite_matching(_pattern(matrix)) >= 0).all())
+
+
+def structural_rank(matrix: csc_array) -> int:
+    """Return the largest rank that a matrix of this pattern may have.
+
+    Examples
+    --------
+    >>> structural_rank(csc_array([[1.0, 1.0], [0.0, 0.0]]))
+    1
+    """
+    from scipy.sparse.csgraph import structural_rank as rank_of  # noqa: PLC0415  # rarely needed
+
+    return int(rank_of(_pattern(matrix)))
+
+
+def _pattern(matrix: csc_array) -> csr_array:
+    """Return where entries are stored, with 32-bit indices: matching in older SciPy takes no others."""
+    rows = csr_array(matrix)
+    ones = np.ones(rows.indices.size)
+    return csr_array((ones, rows.indices.astype(np.int32), rows.indptr.astype(np.int32)), shape=rows.shape)

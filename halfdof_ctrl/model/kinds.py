@@ -3,10 +3,10 @@
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array, hstack
-from scipy.sparse.csgraph import structural_rank
 
 from halfdof_ctrl.base.arrays import ModelMatrix, as_dense
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
+from halfdof_ctrl.base.sparse_factors import structural_rank
 
 LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` ranks no numbers of W, but the pattern of a sparse one
 

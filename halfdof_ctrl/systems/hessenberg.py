@@ -47,6 +47,7 @@ SAFE_GROWTH = 2.0**125  #: growth from one state to the next up to which it is e
 ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
 UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
 RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
+RISK_BY_STATE = 1.25e-12  #: the same for each of many states: the bound grows with their number, errors with its root
 WORST_POINTS = 16  #: corrected points with the largest bounds, at which rounding of the residual is bounded ...
 INDEPENDENT = 3.0  #: times the root of the sum of squares, which a sum of independent rounding errors hardly exceeds
 OTHER_POINTS = 16  #: ... and as many others, spread over all
@@ -120,7 +121,7 @@ class _Channels:
         self.A, self.B, self.C = A, B, C
         self.adjoints: dict[int, ShiftedSolver] = {}
         self.lengths, self.size = np.linalg.norm(C, axis=1), float(np.linalg.norm(A, 1))
-        self.bound = 0.0
+        self.risk, self.bound = max(RISK, RISK_BY_STATE * len(A)), 0.0
 
     def add_to(self, values: ComplexArray, points: ComplexArray) -> float:
         """Add it to values (p, m, k), an input at a time; return the largest bound of a relative error."""
@@ -140,9 +141,9 @@ class _Channels:
             response = _real_times_complex(rotated, x)
             size = np.abs(response)
             bound = EPS * self.size * _column_norms(x) ** 2 * self.lengths[:, None] / abs(solver.beta)
-            small, hopeless = bound > RISK * size, bound > size
+            small, hopeless = bound > self.risk * size, bound > size
         if not small.any():
-            self.bound = max(self.bound, RISK)
+            self.bound = max(self.bound, self.risk)
             return response
         for i in np.flatnonzero(hopeless.any(axis=1)).tolist():
             response[i, hopeless[i]] = sparse_response(self.A, self.B[:, j], self.C[i], points[hopeless[i]])
