@@ -23,13 +23,10 @@ from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
 from halfdof_ctrl.design.care_problem import CareProblem, CareSolution, Roundings, relative_change
 from halfdof_ctrl.design.digits import Decimals, decimals, doubles, inverse, lyapunov, many_digits, matrix_sign
 from halfdof_ctrl.design.modal_basis import ModalBasis
+from halfdof_ctrl.design.newton_steps import MOST_STEPS, NewtonSteps
 
 DIGITS = 80  #: of a residual
 SIGN_DIGITS = (160, 400)  #: of a sign, the next if the one before leaves too large a step
-FEW_STATES_MOST_STEPS = 100  #: of Newton's method, of which each at least halves the distance, from however far
-FROM_AFAR = 0.3  #: steps above this part of the gain halve it, and look alike
-CONTRACTION = 0.75  #: of nearer steps, at least ...
-FEW_STATES_PATIENCE = 3  #: ... but for so many: more mean that the eigenvectors know nothing of some part
 CONVERGED = 1e-18  #: a last step below this part of the gain
 FEW_STATES_REFINEMENTS = 3  #: of what a random rounding does to X
 FEW_STATES_NOTHING = 1e-30  #: of the largest effort: that of an input to which nothing is fed back
@@ -97,9 +94,9 @@ def solved_with_digits(problem: CareProblem, starts: Iterable[FloatArray]) -> Ca
 
 def _improved(problem: CareProblem, exact: _Exact, X: Decimals) -> Decimals | None:
     """Take Newton's steps, in doubles, from residuals of many digits; None where they do not shrink."""
-    last, idle = np.inf, 0
+    steps = NewtonSteps()
     rows = doubles(exact.R_inverse.dot(exact.B.T))
-    for _ in range(FEW_STATES_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         gain = exact.gain(X)
         basis = _basis(exact, gain)  # of each step: one that is small beside the gain may double a small damping
         if basis is None:
@@ -107,10 +104,9 @@ def _improved(problem: CareProblem, exact: _Exact, X: Decimals) -> Decimals | No
         components = basis.components(doubles(exact.residual(X, gain)))
         step, found, unit = basis.bound(rows, components), doubles(gain), np.ones(len(X))
         length = max(relative_change(step, found, problem.R, size, FEW_STATES_NOTHING) for size in (unit, basis.scale))
-        idle += last < FROM_AFAR and length > CONTRACTION * last
-        if not np.isfinite(length) or idle > FEW_STATES_PATIENCE:
+        if not steps.goes_on(length):
             return None
-        X, last = X + decimals(basis.solution(components)), length
+        X = X + decimals(basis.solution(components))
         if length < CONVERGED:
             return X
     return None

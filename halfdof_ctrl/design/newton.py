@@ -18,12 +18,9 @@ from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
 from halfdof_ctrl.base.double_double import Double2, added, matrix_product, two_sum
 from halfdof_ctrl.design.care_problem import CAUTION, CareProblem, CareSolution, Roundings, relative_change
 from halfdof_ctrl.design.modal_basis import ModalBasis
+from halfdof_ctrl.design.newton_steps import MOST_STEPS, NewtonSteps
 
 NEWTON_SETTLED = 1e-15  #: a step that changes the gain by less is the last one
-NEWTON_MOST_STEPS = 100  #: each at least halves the distance, from however far
-NEWTON_FROM_AFAR = 0.3  #: steps above this part of the gain halve it, and look alike
-NEWTON_CONTRACTION = 0.75  #: of nearer steps, at least ...
-NEWTON_PATIENCE = 3  #: ... but for so many: more are rounding
 FAST = 1e-3  #: a step below this part of the one before moves the closed loop so little that its Schur form serves on
 
 
@@ -51,24 +48,23 @@ def solved_by_newton(problem: CareProblem, X: FloatArray | None, gain: FloatArra
         weighted = problem.Q - problem.N @ gain - gain.T @ problem.N.T + gain.T @ gain
         X, lyapunov = lyapunov.solved(weighted), None
     solution: Double2 = X, np.zeros_like(X)
-    last, idle = math.inf, 0
-    for _ in range(NEWTON_MOST_STEPS):
+    steps = NewtonSteps()
+    for _ in range(MOST_STEPS):
         residual, gain = _residual(problem, solution)
         lyapunov = lyapunov or _lyapunov(problem, gain)
         if lyapunov is None or not np.isfinite(residual).all():
             return None
         step = lyapunov.solved(residual)
         length = relative_change(problem.B.T @ step, gain, problem.R, np.ones(len(X)), UNIT_ROUNDOFF)
-        idle += last < NEWTON_FROM_AFAR and length > NEWTON_CONTRACTION * last
-        if not math.isfinite(length) or idle > NEWTON_PATIENCE:
+        before = steps.last
+        if not steps.goes_on(length):
             break
         solution = two_sum(solution[0], solution[1] + step)
-        if length > FAST * last:
+        if length > FAST * before:
             lyapunov = None  # a step that is small beside the gain may still double a small damping
-        last = length
         if length < NEWTON_SETTLED:
             break
-    return _judged(problem, solution, last) if math.isfinite(last) else None
+    return _judged(problem, solution, steps.last) if math.isfinite(steps.last) else None
 
 
 def _judged(problem: CareProblem, solution: Double2, last: float) -> CareSolution | None:
