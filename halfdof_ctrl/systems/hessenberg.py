@@ -26,11 +26,13 @@ Where the first bound exceeds one (at the far end of a long chain) a sparse fact
 digits.
 """
 
+import math
 from contextlib import nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
+from scipy.linalg.blas import dger
+from scipy.linalg.lapack import dgehrd, dorghr
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray
 from halfdof_ctrl.base.spectrum import balanced_states
@@ -38,8 +40,9 @@ from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
 OUTER_BLOCK = 24  #: states whose substitution is done before the rest is updated by one matrix product
-INNER_BLOCK = 4  #: states within that, before the rest of the block is updated by another
+INNER_BLOCK = 4
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
+POINTS_AT_ONCE = 1024  #: points at a time of so few states that a product of an inner block stays on one thread
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other
 CUT_PRODUCTS = 60  #: up to which products are cut so that each runs on one thread; above, threads are limited
 ONE_THREAD = 2**18  #: multiplications of a product up to which OpenBLAS takes one thread
@@ -48,6 +51,7 @@ ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1
 UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
 RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
 RISK_BY_STATE = 1.25e-12  #: the same for each of many states: the bound grows with their number, errors with its root
+LAPACK_BLOCK = 64  #: most columns that LAPACK's reduction to Hessenberg form works on at once
 WORST_POINTS = 16  #: corrected points with the largest bounds, at which rounding of the residual is bounded ...
 INDEPENDENT = 3.0  #: times the root of the sum of squares, which a sum of independent rounding errors hardly exceeds
 OTHER_POINTS = 16  #: ... and as many others, spread over all
@@ -125,7 +129,7 @@ class _Channels:
 
     def add_to(self, values: ComplexArray, points: ComplexArray) -> float:
         """Add it to values (p, m, k), an input at a time; return the largest bound of a relative error."""
-        batch = max(1, POINT_ENTRIES // len(self.A))
+        batch = POINTS_AT_ONCE if len(self.A) <= CUT_PRODUCTS else max(1, POINT_ENTRIES // len(self.A))
         for j in range(self.B.shape[1]):
             solver = ShiftedSolver(self.A, self.B[:, j])
             rotated = self.C @ solver.Q
@@ -140,7 +144,7 @@ class _Channels:
         with np.errstate(invalid="ignore", over="ignore"):
             response = _real_times_complex(rotated, x)
             size = np.abs(response)
-            bound = EPS * self.size * _column_norms(x) ** 2 * self.lengths[:, None] / abs(solver.beta)
+            bound = EPS * self.size * self.lengths[:, None] * _squared_norms(x) / abs(solver.beta)
             small, hopeless = bound > self.risk * size, bound > size
         if not small.any():
             self.bound = max(self.bound, self.risk)
@@ -150,7 +154,7 @@ class _Channels:
             self.bound = np.inf
         small &= ~hopeless
         for i in np.flatnonzero(small.any(axis=1)).tolist():
-            at = small[i]
+            at = np.flatnonzero(small[i])
             risk = bound[i, at] / size[i, at]
             response[i, at] = self._corrected(response[i, at], (i, j), points[at], (solver, x[:, at]), risk)
         return response
@@ -201,13 +205,12 @@ class ShiftedSolver:
     """``Q x = (s I - A)^-1 b`` for one b and many s, by equation (10)."""
 
     def __init__(self, A: FloatArray, b: FloatArray) -> None:
-        reflected, mirror, self.beta = _reflected(A, b)
-        H, Q = scipy.linalg.hessenberg(reflected, calc_q=True, overwrite_a=True, check_finite=False)
-        below = np.abs(np.diagonal(H, -1))
+        H, Q, self.beta = _hessenberg(A, b)
+        below = np.abs(H.diagonal(-1))
         stops = np.flatnonzero(below <= ZERO_SUBDIAGONAL * np.abs(H).max())
         reached = int(stops[0]) + 1 if stops.size else H.shape[0]
-        self.H: FloatArray = np.ascontiguousarray(H[:reached, :reached], dtype=np.float64)  #: the part that b reaches
-        self.Q = (Q - np.outer(mirror, mirror @ Q))[:, :reached]  #: (N, reached) its orthonormal basis
+        self.H: FloatArray = np.ascontiguousarray(H[:reached, :reached])  #: the part that b reaches
+        self.Q: FloatArray = Q[:, :reached]  #: (N, reached) its orthonormal basis
 
     def solve(self, points: ComplexArray) -> ComplexArray:
         """Return x, (reached, k), in the coordinates of Q."""
@@ -222,12 +225,13 @@ class ShiftedSolver:
     def _substituted(self, x: ComplexArray, points: ComplexArray) -> ComplexArray:
         """Fill x from its last row upwards, and return row 1 of (s I - H) x."""
         H, n, real = self.H, len(x), x.view(np.float64)
-        inner = INNER_BLOCK if self._growth(points) < SAFE_GROWTH else 1
+        growth = self._growth(points)
+        inner = INNER_BLOCK if growth < SAFE_GROWTH else 1
+        may_be_huge = n * math.log(growth) > math.log(HUGE)
         row = np.empty(x.shape[1], dtype=np.complex128)
-        scratch = np.empty((inner, real.shape[1]))
         for stop in range(n, 0, -OUTER_BLOCK):
             first = max(0, stop - OUTER_BLOCK)
-            sums = _product(H[first:stop, stop - 1 :], real[stop - 1 :])  # row i: sum of h_ij x_j over the known j
+            sums = _sums(H[first:stop, stop - 1 :], real[stop - 1 :])  # row i: sum of h_ij x_j over the known j
             for end in range(stop, first, -inner):
                 begin = max(first, end - inner)
                 part = sums[begin - first : end - first]
@@ -241,30 +245,32 @@ class ShiftedSolver:
                     np.multiply(row.view(np.float64), 1.0 / H[i, i - 1], out=real[i - 1])
                     above = i - begin
                     if above:
-                        part[:above] += np.multiply(H[begin:i, i - 1 : i], real[i - 1], out=scratch[:above])
-                found = real[begin - 1 : end - 1]
-                if max(found.max(), -found.min()) > HUGE:
-                    _scale_down(x[begin - 1 :], end - begin, sums.view(np.complex128))
+                        dger(1.0, real[i - 1], H[begin:i, i - 1], a=part[:above].T, overwrite_a=True)
+                if may_be_huge:
+                    found = real[begin - 1 : end - 1]
+                    if max(found.max(), -found.min()) > HUGE:
+                        _scale_down(x[begin - 1 :], end - begin, sums.view(np.complex128))
         return row
 
     def _growth(self, points: ComplexArray) -> float:
-        """Bound how much larger a state may be than the largest of those below it."""
+        """Bound how much larger a state may be than the largest of those below it; at least one."""
         H = self.H
         rows = np.abs(points).max(initial=0.0) + np.abs(H[1:]).sum(axis=1)
-        return float((rows / np.abs(np.diagonal(H, -1))).max(initial=0.0))
+        return max(1.0, float((rows / np.abs(H.diagonal(-1))).max(initial=0.0)))
 
 
-def _reflected(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-    """Reflect so that b becomes beta e_1: give P A P, v and beta, P = I - v v^T."""
-    norm = float(np.linalg.norm(b))
-    if not b[1:].any():
-        return A.copy(), np.zeros_like(b), float(b[0])
-    sign = -1.0 if b[0] > 0.0 else 1.0
-    v = b / norm
-    v[0] -= sign
-    v *= np.sqrt(2.0) / np.linalg.norm(v)
-    reflected = A - np.outer(v, v @ A)
-    return reflected - np.outer(reflected @ v, v), v, sign * norm
+def _hessenberg(A: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Return H, Q and beta: what LAPACK makes of ``[[0, 0], [b, A]]``, whose first unit vector it keeps."""
+    n = len(A)
+    bordered = np.zeros((n + 1, n + 1), order="F")
+    bordered[1:, 0], bordered[1:, 1:] = b, A
+    work = LAPACK_BLOCK * (n + 1 + LAPACK_BLOCK + 1)
+    reduced, tau, _ = dgehrd(bordered, lwork=work, overwrite_a=True)
+    Q, _ = dorghr(reduced, tau, lwork=work)
+    H = reduced[1:, 1:]
+    for column in range(n - 2):
+        H[column + 2 :, column] = 0.0
+    return H, Q[1:, 1:], float(reduced[1, 0])
 
 
 def _scale_down(known: ComplexArray, new: int, sums: ComplexArray) -> None:
@@ -275,8 +281,10 @@ def _scale_down(known: ComplexArray, new: int, sums: ComplexArray) -> None:
     sums[:, grown] *= TINY
 
 
-def _product(matrix: FloatArray, x: FloatArray) -> FloatArray:
-    """Multiply, in pieces so small that none of them starts threads, which takes longer than the work itself."""
+def _sums(matrix: FloatArray, x: FloatArray) -> FloatArray:
+    """Return the product, in pieces so small that none starts threads, which takes longer than the work itself."""
+    if len(x) == 1:  # the ones of the last state
+        return np.multiply(matrix, x)
     piece = ONE_THREAD // matrix.size
     if piece >= x.shape[1] or len(x) > CUT_PRODUCTS:
         return np.asarray(matrix @ x)
@@ -291,7 +299,7 @@ def _real_times_complex(matrix: FloatArray, x: ComplexArray) -> ComplexArray:
     return (matrix @ np.ascontiguousarray(x).view(np.float64)).view(np.complex128)
 
 
-def _column_norms(x: ComplexArray) -> FloatArray:
+def _squared_norms(x: ComplexArray) -> FloatArray:
     real = x.view(np.float64)
     squares = np.einsum("ij,ij->j", real, real)
-    return np.asarray(np.sqrt(squares[0::2] + squares[1::2]))
+    return np.asarray(squares[0::2] + squares[1::2])
