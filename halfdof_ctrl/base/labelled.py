@@ -36,7 +36,9 @@ class Axis(NamedTuple):
 
 def has_labels(values: Sequence[object]) -> bool:
     """Return whether one of the values is a labelled matrix or vector."""
-    return any([type(value) not in UNLABELLED_TYPES and _is_labelled(value) for value in values])  # noqa: C419  # faster
+    if UNLABELLED_TYPES.issuperset(map(type, values)):
+        return False
+    return any(type(value) not in UNLABELLED_TYPES and _is_labelled(value) for value in values)
 
 
 def without_labels(

@@ -13,6 +13,7 @@ from scipy.sparse import coo_array, csc_array, csr_array, diags_array, eye_array
 
 from halfdof_ctrl.base.arrays import (
     MATRIX_DIMENSIONS,
+    PLAIN_TYPES,
     REAL,
     FloatArray,
     Matrix,
@@ -50,7 +51,7 @@ MOST_STORED = 2**31 - 1  #: entries of a sparse matrix, which are counted in 32 
 
 def has_sparse(values: Sequence[object]) -> bool:
     """Return whether one of the values is a scipy sparse array or matrix."""
-    return any(issparse(value) for value in values)
+    return not PLAIN_TYPES.issuperset(map(type, values)) and any(issparse(value) for value in values)
 
 
 def checked_sparse_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> SparseMatrix:
@@ -153,7 +154,7 @@ def unit_like(pattern: Matrix, size: int) -> ModelMatrix:
 
 def is_sparse(matrix: object) -> "TypeIs[SparseMatrix]":
     """Return whether a matrix of a model is sparse."""
-    return isinstance(matrix, csc_array)
+    return type(matrix) is not np.ndarray and isinstance(matrix, csc_array)  # the first at once
 
 
 def as_sparse(matrix: Matrix) -> SparseMatrix:

@@ -16,7 +16,7 @@ def null_column_kinds(M: ModelMatrix, C: ModelMatrix) -> tuple[npt.NDArray[np.bo
     if is_sparse(M):
         inertial, damped = (np.diff(as_sparse(X).indptr) > 0 for X in (M, C))
     else:
-        inertial, damped = (np.logical_or.reduce(X, axis=0) for X in (M, C))
+        inertial, damped = np.logical_or.reduce(M, axis=0), np.logical_or.reduce(C, axis=0)
     return np.asarray(inertial), np.asarray(damped > inertial)
 
 

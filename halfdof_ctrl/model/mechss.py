@@ -137,17 +137,20 @@ def mechss(
     p = _signals((F, G, H), axis=0, default=n)
     every_force = B is None and Bv is None and Ba is None
     every_displacement = F is None and G is None and H is None
+    zeros = zeros_like(K, n, m)
     input_columns = (
-        unit_like(K, n) if every_force else _checked_or_zero(B, "B", n, m, K),
-        _checked_or_zero(Bv, "Bv", n, m, K),
-        _checked_or_zero(Ba, "Ba", n, m, K),
+        unit_like(K, n) if every_force else _checked_or(zeros, B, "B"),
+        _checked_or(zeros, Bv, "Bv"),
+        _checked_or(zeros, Ba, "Ba"),
     )
+    zeros = zeros_like(K, p, n)
     output_rows = (
-        unit_like(K, n) if every_displacement else _checked_or_zero(F, "F", p, n, K),
-        _checked_or_zero(G, "G", p, n, K),
-        _checked_or_zero(H, "H", p, n, K),
+        unit_like(K, n) if every_displacement else _checked_or(zeros, F, "F"),
+        _checked_or(zeros, G, "G"),
+        _checked_or(zeros, H, "H"),
     )
-    direct = tuple([_checked_or_zero(X, name, p, m, K) for X, name in ((D, "D"), (Dv, "Dv"), (Da, "Da"))])
+    zeros = zeros_like(K, p, m)
+    direct = (_checked_or(zeros, D, "D"), _checked_or(zeros, Dv, "Dv"), _checked_or(zeros, Da, "Da"))
     plain_inputs = every_force and inputs is None
     plain_outputs = every_displacement and outputs is None and D is None and Dv is None and Da is None
     return SecondOrderModel(
@@ -194,13 +197,14 @@ def _require_orientation(found: tuple[int, ...], letter: str, rows: int, columns
         raise MatrixError(msg, matrix=letter)
 
 
-def _checked_or_zero(value: object, letter: str, rows: int, columns: int, like: ModelMatrix) -> ModelMatrix:
-    """Check one matrix, dense or sparse as `like` is."""
+def _checked_or(zeros: ModelMatrix, value: object, letter: str) -> ModelMatrix:
+    """Check one matrix, in the shape of the zeros that it is by default, dense or sparse as they are."""
     if value is None or is_zero_number(value):
-        return zeros_like(like, rows, columns)
+        return zeros
+    rows, columns = zeros.shape
     _require_orientation(shape_of(value), letter, rows, columns)
     matrix: ModelMatrix
-    if is_sparse(like):
+    if is_sparse(zeros):
         matrix = sparse = checked_sparse_matrix(value, letter, (rows, columns))
         by_row, by_column = largest_by_row_and_column(sparse)
         sizes = np.abs(sparse.data)

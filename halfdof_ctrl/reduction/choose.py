@@ -88,8 +88,9 @@ def exact_reduction(
     solution = _sparsely_solved(model, tol, method) if model.is_sparse else None
     if solution is None:
         solution = _solved(model.as_dense() if model.is_sparse else model, tol, method)
-    solution.evidence.warn(tol)
-    warn_of_file_digits(model, solution.evidence.rcond, tol)
+    evidence = solution.evidence
+    evidence.warn(tol)
+    warn_of_file_digits(model, evidence.rcond, tol)
     return ExactReduction(model=solution.model, solution=solution, tol=tol)
 
 

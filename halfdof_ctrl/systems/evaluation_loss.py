@@ -16,8 +16,6 @@ from scipy.linalg.lapack import dgebal
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.spectrum import balanced
-from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
-from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.loss import loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
@@ -46,7 +44,7 @@ class EvaluationLoss:
     source: int
 
 
-def warn_of_evaluation(sys: control.StateSpace, states: str, model: SecondOrderModel) -> None:
+def warn_of_evaluation(sys: control.StateSpace, states: str, at_origin: int) -> None:
     """Warn where python-control's evaluation of a system loses more than 1e-6.
 
     Parameters
@@ -55,17 +53,14 @@ def warn_of_evaluation(sys: control.StateSpace, states: str, model: SecondOrderM
         As it is handed to the user.
     states : str
         What the states are.
-    model : SecondOrderModel
-        What it was made of.
+    at_origin : int
+        Number of its poles at exactly 0.
 
     Warns
     -----
     LostDigitsWarning
     """
-    if is_even(sys.A):
-        return
-    free = free_motion_count(model.M, model.C, model.K) if len(model.dofs) <= FREE_MOTIONS_LARGEST else None
-    loss = evaluation_loss(sys, at_origin=0 if free is None else free.poles)
+    loss = evaluation_loss(sys, at_origin)
     if loss is None or not loss.value > WARNED:
         return
     msg = (
@@ -86,7 +81,7 @@ def is_even(A: FloatArray) -> bool:
     (True, False)
     """
     if A.size <= EVALUATION_LOSS_FEW_ENTRIES:
-        sizes = [abs(entry) for entry in A.ravel().tolist() if entry]
+        sizes = [abs(entry) for entry in A.ravel("K").tolist() if entry]
         return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
     entries = np.abs(A[A != 0.0])
     return not entries.size or bool(entries.max() <= EVEN_ENTRIES * entries.min())

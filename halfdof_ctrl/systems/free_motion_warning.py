@@ -7,39 +7,24 @@ comes out finite, of any sign. That is usual; where much more is lost it is said
 
 import control
 import numpy as np
-from scipy.linalg.lapack import dgetrf
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
-from halfdof_ctrl.base.spectrum import balanced_states
-from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
-from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.state_map import States
+from halfdof_ctrl.model.free_motions import FreeMotionCount
 
 USUAL_SPURIOUS = 1e-6  #: of the slowest other pole: a double pole at 0 is moved by 1e-8 of it in any case
-FREE_MOTION_WARNING_SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
-def warn_of_free_motions(model: SecondOrderModel, sys: control.StateSpace, states: States) -> bool:
-    """Warn of poles at the origin that a state space does not hold as such, and return whether there are.
+def warn_of_free_motions(sys: control.StateSpace, free: FreeMotionCount) -> bool:
+    """Warn of poles at the origin that a state space in DOFs does not hold as such, and return whether there are.
 
     Warns
     -----
     LostDigitsWarning
         Rounding of A moves them further than that of a double pole does.
     """
-    A = np.asarray(sys.A, dtype=float)
-    if (
-        states not in ("dofs", "scaled")
-        or A.size == 0
-        or len(model.dofs) > FREE_MOTIONS_LARGEST
-        or not _may_be_singular(A)
-    ):
+    size = np.sort(np.abs(np.linalg.eigvals(sys.A)))
+    if size.size < free.poles:
         return False
-    free = free_motion_count(model.M, model.C, model.K)
-    if free is None:
-        return False
-    size = np.sort(np.abs(np.linalg.eigvals(A)))
     spurious, slowest = float(size[free.poles - 1]), float(size[min(free.poles, size.size - 1)])
     if not spurious > USUAL_SPURIOUS * slowest:
         return False
@@ -50,10 +35,3 @@ def warn_of_free_motions(model: SecondOrderModel, sys: control.StateSpace, state
     )
     give_warning(msg, LostDigitsWarning)
     return True
-
-
-def _may_be_singular(A: FloatArray) -> bool:
-    """Tell whether elimination meets a pivot that is zero or nearly so."""
-    factors, _, _ = dgetrf(balanced_states(A)[0])
-    pivots = np.abs(np.diagonal(factors))
-    return bool(pivots.min() <= FREE_MOTION_WARNING_SMALL_PIVOT * pivots.max())

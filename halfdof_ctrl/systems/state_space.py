@@ -31,8 +31,7 @@ from halfdof_ctrl.reduction.energy.modal import modal_form
 from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
-from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
-from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
+from halfdof_ctrl.systems.handover import warn_of_python_control
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 Improper: TypeAlias = Literal["refuse", "drop"]
@@ -130,8 +129,7 @@ def mech2ss(
         model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
     system = system_of_model(model, improper=improper, states=states)
     looked_at = model.model if isinstance(model, ExactReduction) else model
-    if not warn_of_free_motions(looked_at, system, states):
-        warn_of_evaluation(system, states, looked_at)
+    warn_of_python_control(looked_at, system, states)
     return system
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import scipy.linalg
-from scipy.linalg.lapack import dgecon, dgetrf, dgetri, dgetrs, dlange
+from scipy.linalg.lapack import dgecon, dgesv, dgetrf, dgetri, dgetrs, dlange
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling, max_scaling
@@ -15,6 +15,7 @@ LEAST_SIZE = 256  #: n in that bound at least
 PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number is not scaled, nor its state space compared ...
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
 FEW_DOFS = 60  #: DOFs that are few
+FEWEST_DOFS = 8  #: DOFs that are so few that a factorization takes less than a microsecond
 MOST_SCALING_STEPS = 16  #: of the iteration for the best scaling
 LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
 SCALING_GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
@@ -34,7 +35,7 @@ class LeadingMatrix:
     pivots: npt.NDArray[np.int32]
     rows: FloatArray | None  #: (n,) powers of two, None where W was taken as it is
     columns: FloatArray | None  #: (n,) likewise
-    scaled: FloatArray | None  #: (n, n) what was factorized, kept where solutions are to be refined
+    scaled: FloatArray | None  #: (n, n) what was factorized, kept where it is small or solutions are to be refined
     rcond: float  #: reciprocal 1-norm condition number of the matrix that was factorized; 0 if exactly singular
 
     @classmethod
@@ -51,7 +52,8 @@ class LeadingMatrix:
         if len(W) <= FEW_DOFS or not _is_uneven(W, enough):
             factors, pivots, rcond = _lu_and_rcond(W)
             if rcond >= enough:
-                return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=None, rcond=rcond)
+                kept = W if len(W) <= FEWEST_DOFS else None
+                return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=kept, rcond=rcond)
         if len(W) > FEW_DOFS:
             leading = cls._scaled(W, max_scaling(W))
             if leading.rcond >= enough:
@@ -122,8 +124,10 @@ class LeadingMatrix:
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled and its condition asks for it."""
-        if self.rows is None or self.columns is None or self.scaled is None:
+        if self.scaled is None:
             return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
+        if self.rows is None or self.columns is None:  # factorizing again is nothing beside threads that dgetrs starts
+            return np.asarray(dgesv(self.scaled, right)[2])
         right = right * self.rows[:, None]
         solution = dgetrs(self.factors, self.pivots, right)[0]
         if self.rcond < PLAINLY_REGULAR_IF_SMALL:

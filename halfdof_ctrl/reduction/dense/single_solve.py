@@ -35,17 +35,15 @@ def solved_at_once(model: SecondOrderModel, partition: DofPartition, leading: Le
     m, N = model.B.shape[1], moving + n_i
     forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed(model.quadratics.B)
     right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
-    np.negative(partition.times_basis(model.K, 0, moving), out=right[:, :moving])
-    np.negative(partition.times_basis(model.C, 0, n_i), out=right[:, moving:N])
-    for k, matrix in enumerate(forces):
-        right[:, N + k * m : N + (k + 1) * m] = matrix
+    restoring = partition.times_basis(model.K, 0, moving), partition.times_basis(model.C, 0, n_i)
+    np.concatenate((*restoring, *forces), axis=1, out=right)
+    np.negative(right[:, :N], out=right[:, :N])
     solved = leading.solve(right)
     rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
-    rate[:n_i, moving:N] = unit_matrix(n_i)
-    rate[n_i:moving] = solved[n_i:moving]
-    rate[moving:] = solved[:n_i]
-    rate += 0.0  # leaves no negative zeros to be printed
+    np.add(solved[n_i:moving], 0.0, out=rate[n_i:moving])  # adding zero leaves no negative zeros to be printed
+    np.add(solved[:n_i], 0.0, out=rate[moving:])
     A = rate[:, :N]
+    A[:n_i, moving:] = unit_matrix(n_i)
     B, shift = absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     displacement = _displacement(partition, solved, m, shift)
     return StateEquations(A=read_only(A), B=read_only(B), displacement=displacement, shift=shift)

@@ -139,8 +139,8 @@ def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: 
     if not is_zero(model.H):
         velocity = q.combined(model.H).derivative(equations.A, equations.B)
         output = output.plus(velocity.derivative(equations.A, equations.B))
-    direct = trimmed(model.quadratics.D)
-    if direct:
+    if not (is_zero(model.D) and is_zero(model.Dv) and is_zero(model.Da)):
+        direct = trimmed(model.quadratics.D)
         output = output.plus(Signal(np.zeros_like(output.X), direct))
     if len(output.U) <= 1:
         return output

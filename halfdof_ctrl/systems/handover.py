@@ -1,0 +1,57 @@
+"""A state space on its way to the user: a word where python-control will get something else out of it."""
+
+import control
+from scipy.linalg.lapack import dgetrf
+
+from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.systems.evaluation_loss import is_even, warn_of_evaluation
+from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
+from halfdof_ctrl.systems.state_map import States
+
+SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
+
+
+def warn_of_python_control(model: SecondOrderModel, sys: control.StateSpace, states: States) -> None:
+    """Warn of what python-control will lose of a state space.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+        What it was made of.
+    sys : control.StateSpace
+        As it is handed to the user.
+    states : str
+        What its states are.
+
+    Warns
+    -----
+    LostDigitsWarning
+        Poles at the origin that A holds as rounding, or an evaluation that loses digits.
+    """
+    if is_plain(sys.A):
+        return
+    free = free_motion_count(model.M, model.C, model.K) if len(model.dofs) <= FREE_MOTIONS_LARGEST else None
+    if free is not None and states in ("dofs", "scaled") and warn_of_free_motions(sys, free):
+        return
+    if not is_even(sys.A):
+        warn_of_evaluation(sys, states, at_origin=0 if free is None else free.poles)
+
+
+def is_plain(A: FloatArray) -> bool:
+    """Tell in a few microseconds that A has entries of similar sizes and no pole that might be one at the origin.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> is_plain(np.array([[0.0, 1.0], [-400.0, -2.0]])), is_plain(np.array([[0.0, 1.0], [0.0, -2.0]]))
+    (True, False)
+    """
+    if A.size == 0:
+        return True
+    if not is_even(A):
+        return False
+    factors, _, _ = dgetrf(A)
+    pivots = list(map(abs, factors.diagonal().tolist()))
+    return bool(min(pivots) > SMALL_PIVOT * max(pivots))
