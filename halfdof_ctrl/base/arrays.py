@@ -25,7 +25,7 @@ LARGEST_DENSE_COPY = 2000  #: DOFs up to which a sparse model is copied dense fo
 MATRIX_DIMENSIONS = 2
 REAL = np.dtype(np.float64)
 PLAIN_TYPES = frozenset({list, tuple, np.ndarray})  #: types that np.array copies without losing a mask or a pattern
-FEW_ENTRIES = 64  #: of matrices, up to which they are looked at as plain numbers
+FEW_NUMBERS = 64  #: of matrices, up to which they are looked at as plain numbers
 SMALLEST_SIZE = 1e-152  #: of the largest entry of a column, so that the product of two has no underflow
 LARGEST_SIZE = 1e154  #: of an entry, so that the product of two does not overflow
 SIGNAL_SIZES = (1e-200, 1e200)  #: the same of B, F and D, which enter a product but once
@@ -303,7 +303,7 @@ def _stacked(values: Sequence[object]) -> list[DenseMatrix] | None:
         return None
     if stack.dtype != REAL or stack.ndim != 1 + MATRIX_DIMENSIONS or stack.shape[1] != stack.shape[2] or not stack.size:
         return None
-    if stack.size <= FEW_ENTRIES:  # plain numbers take a third of the time
+    if stack.size <= FEW_NUMBERS:  # plain numbers take a third of the time
         sizes = [abs(entry) for entry in stack.ravel().tolist() if entry]
         fits = not sizes or (min(sizes) >= SMALLEST_SIZE and sum(sizes) <= LARGEST_SIZE)  # a sum with NaN is not
     else:

@@ -23,7 +23,7 @@ from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
 from halfdof_ctrl.design.care_problem import CareProblem, CareSolution, Roundings, relative_change
 from halfdof_ctrl.design.digits import Decimals, decimals, doubles, inverse, lyapunov, many_digits, matrix_sign
 from halfdof_ctrl.design.modal_basis import ModalBasis
-from halfdof_ctrl.design.newton_steps import MOST_STEPS, NewtonSteps
+from halfdof_ctrl.design.newton_steps import MOST_NEWTON_STEPS, NewtonSteps
 
 DIGITS = 80  #: of a residual
 SIGN_DIGITS = (160, 400)  #: of a sign, the next if the one before leaves too large a step
@@ -96,7 +96,7 @@ def _improved(problem: CareProblem, exact: _Exact, X: Decimals) -> Decimals | No
     """Take Newton's steps, in doubles, from residuals of many digits; None where they do not shrink."""
     steps = NewtonSteps()
     rows = doubles(exact.R_inverse.dot(exact.B.T))
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_NEWTON_STEPS):
         gain = exact.gain(X)
         basis = _basis(exact, gain)  # of each step: one that is small beside the gain may double a small damping
         if basis is None:

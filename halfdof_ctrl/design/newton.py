@@ -18,7 +18,7 @@ from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
 from halfdof_ctrl.base.double_double import Double2, added, matrix_product, two_sum
 from halfdof_ctrl.design.care_problem import CAUTION, CareProblem, CareSolution, Roundings, relative_change
 from halfdof_ctrl.design.modal_basis import ModalBasis
-from halfdof_ctrl.design.newton_steps import MOST_STEPS, NewtonSteps
+from halfdof_ctrl.design.newton_steps import MOST_NEWTON_STEPS, NewtonSteps
 
 NEWTON_SETTLED = 1e-15  #: a step that changes the gain by less is the last one
 FAST = 1e-3  #: a step below this part of the one before moves the closed loop so little that its Schur form serves on
@@ -49,7 +49,7 @@ def solved_by_newton(problem: CareProblem, X: FloatArray | None, gain: FloatArra
         X, lyapunov = lyapunov.solved(weighted), None
     solution: Double2 = X, np.zeros_like(X)
     steps = NewtonSteps()
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_NEWTON_STEPS):
         residual, gain = _residual(problem, solution)
         lyapunov = lyapunov or _lyapunov(problem, gain)
         if lyapunov is None or not np.isfinite(residual).all():

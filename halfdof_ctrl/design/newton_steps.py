@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
-MOST_STEPS = 100  #: each at least halves the distance, from however far
+MOST_NEWTON_STEPS = 100  #: each at least halves the distance, from however far
 FROM_AFAR = 0.3  #: steps above this part of the gain halve it, and look alike
 CONTRACTION = 0.75  #: of nearer steps, at least ...
-PATIENCE = 3  #: ... but for so many: more are rounding, or show that nothing is known of some part
+STALLED_STEPS = 3  #: ... but for so many: more are rounding, or show that nothing is known of some part
 
 
 @dataclass(slots=True)
@@ -26,7 +26,7 @@ class NewtonSteps:
         [True, True, True, True, False]
         """
         self.idle += self.last < FROM_AFAR and length > CONTRACTION * self.last
-        if not math.isfinite(length) or self.idle > PATIENCE:
+        if not math.isfinite(length) or self.idle > STALLED_STEPS:
             return False
         self.last = length
         return True

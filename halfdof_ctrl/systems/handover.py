@@ -10,7 +10,7 @@ from halfdof_ctrl.systems.evaluation_loss import is_even, warn_of_evaluation
 from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
 from halfdof_ctrl.systems.state_map import States
 
-SMALL_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
+NEARLY_NO_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
 def warn_of_python_control(model: SecondOrderModel, sys: control.StateSpace, states: States) -> None:
@@ -54,4 +54,4 @@ def is_plain(A: FloatArray) -> bool:
         return False
     factors, _, _ = dgetrf(A)
     pivots = list(map(abs, factors.diagonal().tolist()))
-    return bool(min(pivots) > SMALL_PIVOT * max(pivots))
+    return bool(min(pivots) > NEARLY_NO_PIVOT * max(pivots))
