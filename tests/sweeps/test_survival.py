@@ -17,6 +17,7 @@ from numpy.testing import assert_array_equal
 
 from halfdof_ctrl import hydromount, sweep
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SignalNameError, WorkerError
+from halfdof_ctrl.sweeps import crew, workers
 from support import sweepcases
 
 pytestmark = pytest.mark.processes
@@ -147,16 +148,21 @@ def test_a_timeout_that_nobody_can_keep_is_refused() -> None:
 # --- sweeps too short for processes
 
 
-def test_a_sweep_of_the_package_too_short_for_processes_runs_here() -> None:
+NEVER_LONG = 1e6  #: seconds that a sweep may take and still count as short, however slow the machine is
+
+
+def test_a_sweep_of_the_package_too_short_for_processes_runs_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """It says so, by no warning, and gives the same numbers."""
+    monkeypatch.setattr(workers, "SHORT_SECONDS", NEVER_LONG)
     result = sweep(hydromount, {"C_h": [100.0, 300.0]}, workers=4)
     assert result.ran == "in this process, since it was too short for others"
     assert repr(result).splitlines()[-1] == f"  computed {result.ran}"
     assert_array_equal(np.asarray(result.poles), np.asarray(sweep(hydromount, {"C_h": [100.0, 300.0]}).poles))
 
 
-def test_a_sweep_of_a_users_function_too_short_for_many_processes_takes_one() -> None:
+def test_a_sweep_of_a_users_function_too_short_for_many_processes_takes_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """The function may end the process that it is in, so that is not this one."""
+    monkeypatch.setattr(crew, "SHORT_SECONDS", NEVER_LONG)
     result = sweep(sweepcases.process, {"x": range(COUNT)}, workers=4)
     assert result.ran == "in one process, since it was too short for more"
     assert len({os.getpid(), *np.asarray(result.values).tolist()}) == 2
