@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES
@@ -46,10 +47,11 @@ def projected(
         The motion that each of its DOFs is.
     """
     kept, count = motions.kept.size, motions.omega.size
-    M, C, K = (_between(motions.shapes, parts[letter]) for letter in "MCK")
-    M, K = (M + M.T) / 2.0, (K + K.T) / 2.0
     modal = slice(kept, kept + count)
+    M, K = (_outside(motions.shapes, parts[letter], modal) for letter in "MK")
     M[modal, modal], K[modal, modal] = np.eye(count), np.diag(motions.omega**2)
+    C, gyroscopic = _between(motions.shapes, parts["C"]), csc_array(parts["C"] - parts["C"].T)
+    C = C if gyroscopic.data.any() else (C + C.T) / 2.0
     signals: dict[str, Any] = {letter: np.asarray(parts[letter].T @ motions.shapes).T for letter in ("B", "Bv", "Ba")}
     signals |= {letter: times(parts[letter], motions.shapes) for letter in ("F", "G", "H")}
     lost = _between(motions.shapes, parts[IMAGINARY_STIFFNESS]) if IMAGINARY_STIFFNESS in parts else None
@@ -75,10 +77,23 @@ def projected(
 
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:
     """Return ``basis^T matrix basis``, some columns at a time."""
-    product = np.empty((basis.shape[1], basis.shape[1]))
+    product = np.zeros((basis.shape[1], basis.shape[1]))
+    if matrix.nnz == 0:
+        return product
     for start in range(0, basis.shape[1], MOTIONS_AT_A_TIME):
         span = slice(start, start + MOTIONS_AT_A_TIME)
         product[:, span] = basis.T @ times(matrix, basis[:, span])
+    return product
+
+
+def _outside(basis: FloatArray, matrix: SparseMatrix, known: slice) -> FloatArray:
+    """Return ``basis^T matrix basis`` of a symmetric matrix but for the block of some motions, which stays zero."""
+    others = np.delete(np.arange(basis.shape[1]), known)
+    part = basis.T @ times(matrix, basis[:, others])
+    product = np.zeros((basis.shape[1], basis.shape[1]))
+    product[:, others] = part
+    product[others] = part.T
+    product[np.ix_(others, others)] = (part[others] + part[others].T) / 2.0
     return product
 
 

@@ -8,7 +8,9 @@ one step of inverse iteration with the full matrices, and the Rayleigh quotient 
 whose root nearest to s_i is the full model's pole to twice the digits of w. The shift of frequency and of damping, and
 the change of the residue (F w)(w^T B) / (w^T (C + 2 s M) w), are the error where a value at a needle-sharp resonance
 says nothing: any shift at all is an error of many times the value there. Poles closer than one per cent are improved
-together, by a block and its Rayleigh-Ritz problem. Below 2 u |w|^T |K| |w| / (w^T K w) a shift is not told from
+together, by a block and its Rayleigh-Ritz problem; their neighbours outside the group are in the block too, for a shift
+that is larger than the distance of two poles mixes their vectors. For the same reason poles that are not told apart
+have one height, that of the sum of their residues. Below 2 u |w|^T |K| |w| / (w^T K w) a shift is not told from
 rounding.
 """
 
@@ -17,9 +19,11 @@ from typing import Any
 
 import numpy as np
 import scipy.linalg
+from scipy.optimize import linear_sum_assignment
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
+from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_factors import sparse_lu
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -31,7 +35,9 @@ LOWEST, RESONANCE_ERROR_HIGHEST = (
 CHECKED_SIZE = 2**26  #: ... and all others while DOFs times resonances are fewer
 RESONANCE_ERROR_FLOOR = 2.0  #: times u: half of what rounds the entries of K, the sums that they are, and the energy
 POLES_TOGETHER = 0.01  #: relative distance of poles that are improved together
-LARGEST_GROUP = 12  #: poles that are improved together at most
+LARGEST_GROUP = 48  #: poles that are improved together at most ...
+NEIGHBOURS = 24  #: ... with so many on either side, as close, that may be mixed with them
+TOLD_APART = 20.0  #: times their shift: poles as close as that are one resonance, whose residues are added
 POLE_ASIDE = 1e-4  #: relative: an undamped pole is approached so far beside the axis
 UNDAMPED_POLE = 1e-6  #: of its size: the real part of a pole that counts as undamped here
 MASS_SHIFT = 1e-3  #: of the squared end of the band: makes a stiffness regular that leaves motions free
@@ -46,7 +52,8 @@ class ResonanceErrors:
     frequencies: FloatArray  #: (k,) of the small model [Hz]
     frequency_shift: FloatArray  #: (k,) relative to the frequency
     damping_shift: FloatArray  #: (k,) of the damping ratio
-    height: FloatArray  #: (k,) change of the residues, relative, in the channel where it is largest
+    height: FloatArray  #: (k,) relative change of the residue, in the channel where it is largest; of the sum of the
+    #: residues where poles are closer than 20 times their shift, one value for all of them
     floor: FloatArray  #: (k,) relative shift of frequency that rounding of the full model's K may make
     poles: ComplexArray  #: (k,) of the small model [rad/s]
     in_band: int  #: resonances that there are, the lowest and the highest of which were checked if k is smaller
@@ -79,28 +86,39 @@ def resonance_errors(
     if poles.size > most:
         chosen = np.concatenate([chosen[:LOWEST], chosen[LOWEST - most :]])
     poles, vectors = poles[chosen], vectors[:, chosen]
-    found, shapes, floor = np.empty_like(poles), np.empty((basis.shape[0], poles.size), dtype=np.complex128), []
-    for group in _groups(poles):
-        found[group], shapes[:, group] = _improved(parts, poles[group], basis @ vectors[:, group])
-    size_of_K: Any = abs(parts["K"])
-    for k in range(poles.size):
-        w = shapes[:, k]
-        stiff: Any = parts["K"] @ w
-        energy = abs(complex(w @ stiff))
-        floor.append(
-            RESONANCE_ERROR_FLOOR * UNIT_ROUNDOFF * float(np.abs(w) @ (size_of_K @ np.abs(w))) / energy
-            if energy
-            else 0.0
-        )
+    found, shapes = np.empty_like(poles), np.empty((basis.shape[0], poles.size), dtype=np.complex128)
+    floor = np.empty(poles.size)
+    for own, block in progress(_groups(poles), "groups of resonances"):
+        values, w = _improved(parts, poles[block], _lifted(basis, vectors[:, block]))
+        mine = slice(own.start - block.start, own.stop - block.start)
+        found[own], shapes[:, own] = values[mine], w[:, mine]
+        floor[own] = _floor(parts["K"], shapes[:, own])
     return ResonanceErrors(
         frequencies=np.abs(poles) / (2.0 * np.pi),
         frequency_shift=np.abs(np.abs(found) - np.abs(poles)) / np.abs(found),
         damping_shift=np.abs(found.real / np.abs(found) - poles.real / np.abs(poles)),
-        height=_height_errors(parts, small, (poles, vectors), (found, shapes)),
-        floor=np.array(floor),
+        height=_height_errors(parts, small, (poles, vectors), (found, shapes), floor),
+        floor=floor,
         poles=poles,
         in_band=in_band,
     )
+
+
+def _lifted(basis: FloatArray, vectors: ComplexArray) -> ComplexArray:
+    """Give vectors of the small model in the coordinates of the full one."""
+    lifted = np.asarray(basis @ vectors.real, dtype=np.complex128)
+    if vectors.imag.any():
+        lifted.imag = basis @ vectors.imag
+    return lifted
+
+
+def _floor(K: SparseMatrix, shapes: ComplexArray) -> FloatArray:
+    """Return the relative shift of frequencies that rounding of K may make."""
+    stiff: Any = K @ shapes
+    size: Any = abs(K) @ np.abs(shapes)
+    energy = np.abs(np.einsum("ij,ij->j", shapes, stiff))
+    most = RESONANCE_ERROR_FLOOR * UNIT_ROUNDOFF * np.einsum("ij,ij->j", np.abs(shapes), size)
+    return np.asarray(np.divide(most, energy, out=np.zeros(energy.size), where=energy > 0.0))
 
 
 def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[ComplexArray, ComplexArray]:
@@ -146,16 +164,24 @@ def _damped_roots(K: FloatArray, C: FloatArray, M: FloatArray) -> tuple[ComplexA
     return np.asarray(values, dtype=np.complex128), scipy.linalg.solve_triangular(lower.T, vectors[:n])
 
 
-def _groups(poles: ComplexArray) -> list[list[int]]:
-    """Put poles that are close side by side into groups."""
-    groups: list[list[int]] = []
-    for k in range(poles.size):
-        near = groups and abs(poles[k] - poles[groups[-1][-1]]) <= POLES_TOGETHER * abs(poles[k])
-        if near and len(groups[-1]) < LARGEST_GROUP:
-            groups[-1].append(k)
-        else:
-            groups.append([k])
+def _groups(poles: ComplexArray) -> list[tuple[slice, slice]]:
+    """Put poles that are close side by side into groups; give each, and the same with its neighbours."""
+    groups, start = [], 0
+    while start < poles.size:
+        stop = _reach(poles, start, min(start + LARGEST_GROUP, poles.size), 1)
+        low = _reach(poles, start, max(start - NEIGHBOURS, 0) - 1, -1) + 1
+        high = _reach(poles, stop - 1, min(stop + NEIGHBOURS, poles.size), 1)
+        groups.append((slice(start, stop), slice(low, high)))
+        start = stop
     return groups
+
+
+def _reach(poles: ComplexArray, start: int, end: int, step: int) -> int:
+    """Return the first place, from one on towards an end, whose pole is not close to the first any more."""
+    for place in range(start, end, step):
+        if abs(poles[place] - poles[start]) > POLES_TOGETHER * abs(poles[start]):
+            return place
+    return end
 
 
 def _improved(
@@ -175,21 +201,23 @@ def _improved(
     w = factors.solve(np.asfortranarray(right, dtype=np.complex128))
     w = w / np.abs(w).max(axis=0)
     values, vectors = _quadratic_roots(w.T @ (K @ w), w.T @ (C @ w), w.T @ (M @ w), s)
-    found, places = np.empty_like(poles), []
-    left = list(range(values.size))
-    for k, pole in enumerate(poles.tolist()):
-        place = left[int(np.abs(values[left] - pole).argmin())]
-        left.remove(place)
-        places.append(place)
-        found[k] = values[place]
-    return found, w @ vectors[:, places]
+    _, places = linear_sum_assignment(np.abs(poles[:, None] - values))
+    return values[places], w @ vectors[:, places]
 
 
 def _quadratic_roots(K: Any, C: Any, M: Any, scale: complex) -> tuple[ComplexArray, ComplexArray]:  # noqa: ANN401
-    """Return the roots and vectors of a small quadratic problem with complex symmetric matrices."""
-    n, size = K.shape[0], abs(scale)
-    left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -size * C]])
-    right = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), size**2 * M]])
+    """Return the roots and vectors of a small quadratic problem with complex symmetric matrices.
+
+    In units in which the roots and K are of size one, as the identity is that makes the problem a linear one.
+    """
+    n, size, most = K.shape[0], abs(scale), float(np.abs(K).max()) or 1.0
+    K, C, M = K / most, C * (size / most), M * (size**2 / most)
+    if not C.any():
+        squares, vectors = scipy.linalg.eig(-K, M)
+        roots = size * np.sqrt(np.asarray(squares, dtype=np.complex128))
+        return np.where(roots.imag < 0.0, -roots, roots), np.asarray(vectors, dtype=np.complex128)
+    left = np.block([[np.zeros((n, n)), np.eye(n)], [-K, -C]])
+    right = np.block([[np.eye(n), np.zeros((n, n))], [np.zeros((n, n)), M]])
     values, vectors = scipy.linalg.eig(left, right)
     return np.asarray(size * values, dtype=np.complex128), np.asarray(vectors[:n], dtype=np.complex128)
 
@@ -199,26 +227,44 @@ def _height_errors(
     small: SecondOrderModel,
     reduced: tuple[ComplexArray, ComplexArray],
     full: tuple[ComplexArray, ComplexArray],
+    floor: FloatArray,
 ) -> FloatArray:
     """Return the relative change of the residues, in the channel where it is largest."""
-    if reduced[0].size == 0:
+    poles, found = reduced[0], full[0]
+    if poles.size == 0:
         return np.zeros(0)
     dense: dict[str, Any] = {letter: np.asarray(getattr(small, letter)) for letter in (*parts,)}
     first, second = (_residues(matrices, *each) for matrices, each in ((dense, reduced), (parts, full)))
-    weight = np.abs(second) / np.abs(full[0])[:, None, None]
+    shift = np.maximum(np.abs(found - poles), floor * np.abs(poles))
+    gaps = np.abs(np.diff(poles))
+    starts = np.append(0, 1 + np.flatnonzero(gaps > TOLD_APART * np.maximum(shift[1:], shift[:-1])))
+    change = np.abs(np.add.reduceat(first - second, starts))
+    size = np.maximum(np.abs(np.add.reduceat(second, starts)), np.maximum.reduceat(np.abs(second), starts))
+    weight = size / np.abs(found[starts])[:, None, None]
     shown = weight > SILENT_RESONANCE * weight.max(axis=0, keepdims=True)
+    size = _with_mixed_in(size, gaps[starts[1:] - 1], np.maximum.reduceat(shift, starts), np.abs(poles[starts]))
     with np.errstate(divide="ignore", invalid="ignore"):
-        change = np.where(shown, np.abs(first - second) / np.abs(second), 0.0)
-    return np.asarray(np.nan_to_num(change).max(axis=(1, 2)))
+        relative = np.nan_to_num(np.where(shown, change / size, 0.0)).max(axis=(1, 2))
+    return np.asarray(np.repeat(relative, np.diff(np.append(starts, poles.size))))
+
+
+def _with_mixed_in(size: FloatArray, gaps: FloatArray, shift: FloatArray, where: FloatArray) -> FloatArray:
+    """Return sizes of residues (k, p, m), at least the part of a close neighbour's that the shift may mix in.
+
+    A needle that is silent between two loud ones is measured by those.
+    """
+    close = gaps <= POLES_TOGETHER * where[1:]
+    part = np.where(close, np.minimum(TOLD_APART * np.maximum(shift[1:], shift[:-1]) / gaps, 1.0), 0.0)[:, None, None]
+    mixed = size.copy()
+    mixed[1:] = np.maximum(mixed[1:], part * size[:-1])
+    mixed[:-1] = np.maximum(mixed[:-1], part * size[1:])
+    return mixed
 
 
 def _residues(matrices: Any, poles: ComplexArray, vectors: ComplexArray) -> ComplexArray:  # noqa: ANN401
     """Return ``(F(s) w)(w^T B(s)) / (w^T (C + 2 s M) w)``, (k, p, m)."""
-    residues = []
-    for k, s in enumerate(poles.tolist()):
-        w = vectors[:, k]
-        out = matrices["F"] @ w + s * (matrices["G"] @ w) + s**2 * (matrices["H"] @ w)
-        drive = matrices["B"].T @ w + s * (matrices["Bv"].T @ w) + s**2 * (matrices["Ba"].T @ w)
-        slope = w @ (matrices["C"] @ w) + 2.0 * s * (w @ (matrices["M"] @ w))
-        residues.append(np.outer(out, drive) / slope)
-    return np.array(residues)
+    F, G, H = (matrices[letter] @ vectors for letter in "FGH")
+    B, Bv, Ba = (matrices[letter].T @ vectors for letter in ("B", "Bv", "Ba"))
+    C, M = (np.einsum("ij,ij->j", vectors, matrices[letter] @ vectors) for letter in "CM")
+    out, drive = F + poles * (G + poles * H), B + poles * (Bv + poles * Ba)
+    return np.asarray(np.einsum("pk,mk->kpm", out, drive / (C + 2.0 * poles * M)))

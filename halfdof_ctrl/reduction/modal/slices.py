@@ -12,6 +12,7 @@ from scipy.sparse.linalg import ArpackError, LinearOperator, eigsh
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import ParameterError
+from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.sparse_products import times
@@ -54,26 +55,28 @@ def modes_by_slices(K: SparseMatrix, M: SparseMatrix, count: int) -> tuple[Float
     low, high = _ends(K, M, count)
     squares, shapes = [], []
     left = [(*low, *high)]
-    while left:
-        start, below, stop, above = left.pop()
-        if above == below:
-            continue
-        is_narrow = stop - start <= NARROW * max(abs(stop), abs(start))
-        found = None
-        if above - below <= MODES_IN_SLICE or is_narrow:
-            found = _in_slice(K, M, (start, stop), above - below)
-        if found is not None:
-            squares.append(found[0])
-            shapes.append(found[1])
-            continue
-        if is_narrow:
-            msg = (
-                f"The Lanczos iteration does not find the {above - below} modes that lie between "
-                f"{_hertz(start):.6g} and {_hertz(stop):.6g} Hz. See that M and K are positive semidefinite."
-            )
-            raise ParameterError(msg, parameter="n_modes", value=count)
-        middle, between = _cut(K, M, (start, below, stop, above))
-        left += [(middle, between, stop, above), (start, below, middle, between)]
+    with progress_bar(high[1], "modes") as advance:
+        while left:
+            start, below, stop, above = left.pop()
+            if above == below:
+                continue
+            is_narrow = stop - start <= NARROW * max(abs(stop), abs(start))
+            found = None
+            if above - below <= MODES_IN_SLICE or is_narrow:
+                found = _in_slice(K, M, (start, stop), above - below)
+            if found is not None:
+                squares.append(found[0])
+                shapes.append(found[1])
+                advance(above - below)
+                continue
+            if is_narrow:
+                msg = (
+                    f"The Lanczos iteration does not find the {above - below} modes that lie between "
+                    f"{_hertz(start):.6g} and {_hertz(stop):.6g} Hz. See that M and K are positive semidefinite."
+                )
+                raise ParameterError(msg, parameter="n_modes", value=count)
+            middle, between = _cut(K, M, (start, below, stop, above))
+            left += [(middle, between, stop, above), (start, below, middle, between)]
     every = np.concatenate(squares)
     order = np.argsort(every)[:count]
     return every[order], np.hstack(shapes)[:, order]

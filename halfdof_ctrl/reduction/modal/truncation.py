@@ -31,7 +31,7 @@ from halfdof_ctrl.base.errors import (
     give_warning,
 )
 from halfdof_ctrl.base.names import listed
-from halfdof_ctrl.base.progress import progress
+from halfdof_ctrl.base.progress import progress, shows_activity
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.doors import checked_model
@@ -49,7 +49,7 @@ MEASURED_POINTS = 12  #: frequencies between resonances at which the error is me
 DOUBTFUL_POINTS = 4  #: frequencies where most is expected of it, at which it is measured too
 MOST_POINTS = 1_000_000  #: more frequencies than any use
 CANDIDATES = 200  #: frequencies among which these are looked for
-MEASURING_EFFORT = 4e10  #: cubes of the small model's size that this may take
+MEASURING_EFFORT = 1e10  #: cubes of the small model's size that this may take
 DECADES = 2.0  #: of the band below its upper end
 ALLOWED_ERROR = 0.05  #: error relative to a channel's largest value, or of a resonance's height, that is warned of
 ALLOWED_SHIFT = 0.01  #: relative shift of a resonance that is warned of
@@ -100,6 +100,7 @@ class TruncatedModel(SecondOrderModel):
         )
 
 
+@shows_activity("truncation")
 @limited_threads(1)
 def truncate_modes(
     model: SecondOrderModel, *, f_max: float | None = None, n_modes: int | None = None, points: int = MEASURED_POINTS
