@@ -7,7 +7,8 @@ With right and left eigenvectors v and w of A, balanced by powers of two, first 
 for a better eigenvalue and for what rounding of the entries of A moves it. The residual is formed in about twice the
 working precision, so the correction is an error and no rounding. Where it is large the vectors are improved by inverse
 iteration from both sides (A. M. Ostrowski, 1957). Small eigenvalues beside large ones keep the digits that the entries
-of A give them: an eigenvalue solver alone leaves u |A| in each.
+of A give them: an eigenvalue solver alone leaves u |A| in each. First order says nothing of eigenvalues that rounding
+does not tell apart; `pole_clusters` bounds these together.
 """
 
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.double_double import added, matrix_product, two_product
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.systems.pole_clusters import clusters
 
 STEPS = 4  #: inverse iterations at most
 COARSE_BOUND = 1e-3  #: a correction above this part of the eigenvalue calls for an iteration ...
@@ -60,6 +62,12 @@ def bounded_poles(A: FloatArray) -> BoundedPoles:
     [-1000000000.0, 1e-09]
     >>> bounded_poles(np.array([[0.0, 1.0], [0.0, 0.0]])).at_origin.tolist()
     [True, True]
+
+    A critically damped oscillator has a double pole, which rounding of its entries moves by the root of that:
+
+    >>> twice = bounded_poles(np.array([[0.0, 1.0], [-1.0, -2.0]]))
+    >>> twice.values.real.round(6).tolist(), bool((twice.bounds < 1e-6).all())
+    ([-1.0, -1.0], True)
     """
     if A.size == 0:
         return BoundedPoles(np.zeros(0, dtype=np.complex128), np.zeros(0))
@@ -79,7 +87,11 @@ def _with_bounds(
     found, bounds = values.copy(), np.empty(values.size)
     v, w = right[:, upper].astype(np.complex128), left[:, upper].astype(np.complex128)
     correction, data = _first_order(A, values[upper], v, w)
+    together = clusters(A, values, *_of_all(values, upper, data, np.abs(np.einsum("ij,ij->j", w.conj(), v))))
+    shared = {place for cluster in together for place in cluster.places.tolist()}
     for k, place in enumerate(upper.tolist()):
+        if place in shared:
+            continue
         value, step, rounding = complex(values[place]), complex(correction[k]), float(data[k])
         if _is_coarse(value, step, rounding, fine=len(A) <= POLE_BOUNDS_MOST_REFINED):
             value, step, rounding = _iterated(A, value, (v[:, k], w[:, k]), step, rounding)
@@ -88,7 +100,20 @@ def _with_bounds(
             value += step
         found[place], bounds[place] = value, rounding + doubt
     _mirror(values, upper, found, bounds)
+    for cluster in together:
+        found[cluster.places], bounds[cluster.places] = cluster.values, cluster.bounds
     return found, bounds
+
+
+def _of_all(
+    values: ComplexArray, upper: npt.NDArray[np.intp], data: FloatArray, cosine: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Give what the upper halves of conjugate pairs have to the lower ones too."""
+    both = np.empty((2, values.size))
+    both[:, upper] = data, cosine
+    pairs = upper[values[upper].imag > 0.0]
+    both[:, pairs + 1] = both[:, pairs]
+    return both[0], both[1]
 
 
 def _mirror(values: ComplexArray, upper: npt.NDArray[np.intp], found: ComplexArray, bounds: FloatArray) -> None:

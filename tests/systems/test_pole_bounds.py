@@ -1,15 +1,18 @@
 """Eigenvalues with bounds, against rational roots."""
 
 import numpy as np
+import numpy.typing as npt
 import pytest
+import scipy.linalg
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from scipy.optimize import linear_sum_assignment
 
 from halfdof_ctrl import exact_reduction, mech2ss, mechss
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
-from halfdof_ctrl.systems.pole_bounds import bounded_poles
+from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
 
 DIGITS = 1e-13  # of a simple, well conditioned eigenvalue
 
@@ -49,3 +52,61 @@ def test_poles_without_energy_coordinates_come_from_the_pencil() -> None:
         np.sort_complex(poles.values) for poles in (pencil_poles(model), bounded_poles(exact_reduction(model).A))
     )
     assert_allclose(one, other, rtol=DIGITS)
+
+
+def unimodular(n: int, seed: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Draw a matrix of small integers and its inverse, which are integers too."""
+    generator = np.random.default_rng(seed)
+    lower = np.eye(n) + np.tril(generator.integers(-1, 2, (n, n)).astype(float), -1)
+    upper = np.eye(n) + np.triu(generator.integers(-1, 2, (n, n)).astype(float), 1)
+    inverse = np.linalg.inv(upper).round() @ np.linalg.inv(lower).round()
+    turn = np.asarray(lower @ upper)
+    assert (turn @ inverse == np.eye(n)).all()
+    return turn, inverse
+
+
+def worst(found: BoundedPoles, exact: npt.ArrayLike) -> float:
+    """Return the largest error of an eigenvalue over its bound, in the best pairing."""
+    error = np.abs(found.values[:, None] - np.asarray(exact))
+    places, partners = linear_sum_assignment(error)
+    return float((error[places, partners] / found.bounds[places]).max())
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4])
+@pytest.mark.parametrize("seed", range(4))
+def test_equal_critically_damped_oscillators_are_within_their_bounds(count: int, seed: int) -> None:
+    """``(s + 1)^2`` as often as there are oscillators, in coordinates of integers that mix these, or mix all states.
+
+    The matrices are exact, and the errors of the double poles the root of rounding, however many are equal.
+    """
+    zero, unit = np.zeros((count, count)), np.eye(count)
+    plain = np.block([[zero, unit], [-unit, -2.0 * unit]])
+    turn, inverse = unimodular(count, seed)
+    both, back = np.kron(np.eye(2), turn), np.kron(np.eye(2), inverse)
+    whole, whole_back = unimodular(2 * count, seed)
+    for A in (plain, both @ plain @ back, whole @ plain @ whole_back):
+        poles = bounded_poles(np.asarray(A))
+        assert worst(poles, -np.ones(2 * count)) <= 1.0
+        assert poles.bounds.max() < 1e-3
+        assert not poles.at_origin.any()
+
+
+@pytest.mark.parametrize(("length", "copies"), [(2, 2), (3, 1), (3, 2), (4, 1), (4, 2)])
+@pytest.mark.parametrize("seed", range(4))
+def test_chains_of_eigenvalues_are_within_their_bounds(length: int, copies: int, seed: int) -> None:
+    """Jordan blocks of -1 beside poles of -3, -64 and -2 +- 5j, in coordinates of integers: all is exact."""
+    chain = np.diag(np.ones(length - 1), 1) - np.eye(length)
+    others = scipy.linalg.block_diag(np.diag([-3.0, -64.0]), np.array([[-2.0, 5.0], [-5.0, -2.0]]))
+    J = scipy.linalg.block_diag(*[chain] * copies, others)
+    turn, inverse = unimodular(len(J), seed)
+    poles = bounded_poles(turn @ J @ inverse)
+    assert worst(poles, [*[-1.0] * (length * copies), -3.0, -64.0, -2.0 + 5.0j, -2.0 - 5.0j]) <= 1.0
+    assert poles.bounds.max() < 0.1
+
+
+def test_equal_undamped_oscillators_keep_their_digits() -> None:
+    """Three equal pairs that are no chain: rounding moves them by itself, not by a root."""
+    turn, inverse = unimodular(6, 1)
+    poles = bounded_poles(turn @ np.kron(np.eye(3), [[0.0, 1.0], [-1.0, 0.0]]) @ inverse)
+    assert worst(poles, [1j, 1j, 1j, -1j, -1j, -1j]) <= 1.0
+    assert poles.bounds.max() < 1e-10
