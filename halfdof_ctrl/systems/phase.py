@@ -39,6 +39,7 @@ RATIO = 1.2  #: of the ends of an interval that a half circle spans
 PHASE_STEP = np.pi / 3.0  #: [rad] largest change between points of a half circle
 ARC_POINTS = 5
 HALVINGS = 6
+CLOSEST = 16.0  #: times what rounding leaves between two points: as near to its ends a half circle is followed
 BELOW = 1e-2  #: of the slowest pole: where the phase is what it is at the origin
 TIED = 1.0  #: [rad] two starts that are so nearly as far from 0: the negative one is taken
 SIDE = 1e-6  #: [rad] by which rounding puts a phase outside what work on the structure allows
@@ -148,9 +149,11 @@ def _start(base: float, rest: float, *, is_real: bool) -> float:
 def _without_common(
     poles: ComplexArray, doubts: FloatArray, zeros: ComplexArray, plane: Plane
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Take out zeros with the poles that they cancel; return the poles and zeros left, and those left on the boundary.
+    """Take out zeros with the poles that they cancel; return the poles and zeros left, and zeros beside poles on the
+    boundary.
 
     On the boundary a pole and a zero side by side turn the phase between them, and cancel elsewhere by themselves.
+    Beside both of them values are rounding.
     """
     left, kept, close = list(range(poles.size)), [], []
     for zero in zeros.tolist():
@@ -163,9 +166,11 @@ def _without_common(
             continue
         place = int(near[apart[near].argmin()])
         pair = np.array([poles[left[place]], zero])
-        if apart[place] > doubts[left[place]] + SAME * abs(zero) and plane.touching(pair).size == pair.size:
-            kept.append(zero)
+        touching = plane.touching(pair).size == pair.size
+        if touching:
             close.append(zero)
+        if touching and apart[place] > doubts[left[place]] + SAME * abs(zero):
+            kept.append(zero)
         else:
             left.pop(place)
     return poles[left], np.array(kept, dtype=np.complex128), np.array(close, dtype=np.complex128)
@@ -216,15 +221,18 @@ def _along_half_circles(
     source: KnownSource, poles: BoundedPoles | None, channel: tuple[int, int], omega: FloatArray, values: ComplexArray
 ) -> FloatArray | None:
     """Follow the phase through the right half plane, from below the slowest pole; None where that fails."""
-    there = np.flatnonzero((omega > 0.0) & np.isfinite(values) & (values != 0.0))
-    if there.size == 0:
-        return None
-    plane, right, first = source.plane, np.zeros(0, dtype=np.complex128), float(omega[there[0]])
-    slowest = first
+    plane, right = source.plane, np.zeros(0, dtype=np.complex128)
+    known = (omega > 0.0) & np.isfinite(values) & (values != 0.0)
     if poles is not None:
         roots = plane.on_boundary(poles.values, ON_AXIS * poles.bounds)
-        moving = plane.exponents(roots[~plane.at_start(roots)])
-        right = moving[moving.real > 0.0]
+        for root in plane.touching(roots):  # where the angle is rounding
+            known &= np.abs(omega - root.imag) > BESIDE_POLE * omega
+    there = np.flatnonzero(known)
+    if there.size == 0:
+        return None
+    slowest = first = float(omega[there[0]])
+    if poles is not None:
+        moving, right = plane.exponents(roots[~plane.at_start(roots)]), plane.exponents(plane.unstable(roots))
         slowest = min(first, BELOW * float(np.abs(moving).min(initial=first / BELOW)))
     nodes = np.append(slowest, omega[there])
     changes = _changes(source, channel, nodes)
@@ -237,6 +245,8 @@ def _along_half_circles(
     angle = _angle(values)
     phase = angle.copy()
     phase[there] = _on_turn(angle[there], begin + np.cumsum(changes))
+    beside = np.flatnonzero(~known & ~np.isnan(angle))
+    phase[beside] = _on_turn(angle[beside], np.interp(omega[beside], omega[there], phase[there]))
     return phase
 
 
@@ -256,11 +266,7 @@ def _changes(source: KnownSource, channel: tuple[int, int], nodes: FloatArray) -
     turns = np.exp(1j * np.linspace(-np.pi / 2.0, np.pi / 2.0, ARC_POINTS))[1:-1]
     paths, ends = [], []
     for low, high in zip(nodes[:-1].tolist(), nodes[1:].tolist(), strict=True):
-        count = int(np.ceil(np.log(high / low) / np.log(RATIO)))
-        pieces = np.array([low, high])
-        if count > 1:
-            pieces = low * (high / low) ** np.linspace(0.0, 1.0, count + 1)
-            pieces[-1] = high
+        pieces = _pieces(low, high, source.plane.widest)
         ends.append(pieces)
         paths.append(_half_circles(pieces, turns))
     found = source.response(*channel, source.plane.points(np.concatenate(paths)))
@@ -278,6 +284,14 @@ def _changes(source: KnownSource, channel: tuple[int, int], nodes: FloatArray) -
     return changes
 
 
+def _pieces(low: float, high: float, widest: float) -> FloatArray:
+    """Cut an interval into pieces of at most a ratio and a width."""
+    ends = [low]
+    while (next_end := min(ends[-1] * RATIO, ends[-1] + widest)) < high:
+        ends.append(next_end)
+    return np.array([*ends, high])
+
+
 def _half_circles(ends: FloatArray, turns: ComplexArray) -> ComplexArray:
     """Return points from j times the first end to the last, along half circles to the right of the axis."""
     path = [np.array([1j * ends[0]])]
@@ -287,18 +301,21 @@ def _half_circles(ends: FloatArray, turns: ComplexArray) -> ComplexArray:
 
 
 def _finer_change(source: KnownSource, channel: tuple[int, int], ends: FloatArray) -> float | None:
-    """Return the change of the phase over an interval from more and more points."""
-    count = ARC_POINTS
+    """Return the change of the phase over an interval from more and more points, ever closer towards its ends.
+
+    An end may lie beside a root on the axis, around which the phase turns within that distance.
+    """
+    ratio = 2.0
     for _ in range(HALVINGS):
-        turns = np.exp(1j * np.linspace(-np.pi / 2.0, np.pi / 2.0, count))[1:-1]
+        closest = CLOSEST * source.plane.resolution(float(ends[-1])) / float(np.diff(ends).max())
+        part = 0.5 * ratio ** -np.arange(max(np.ceil(-np.log(closest) / np.log(ratio)), 1.0))
+        turns = np.exp(1j * np.pi * (np.concatenate([part[::-1], 1.0 - part[1:]]) - 0.5))
         found = source.response(*channel, source.plane.points(_half_circles(ends, turns)))
         if (np.isfinite(found) & (found != 0.0)).all():
             steps = np.angle(found[1:] / found[:-1])
             if np.abs(steps).max() < PHASE_STEP:
                 return float(steps.sum())
-            count = 2 * count - 1
+            ratio = np.sqrt(ratio)
             continue
-        finer = np.geomspace(ends[0], ends[-1], len(ends) + 1)
-        finer[0], finer[-1] = ends[0], ends[-1]
-        ends = finer
+        ends = np.sort(np.append(ends, 0.5 * (ends[1:] + ends[:-1])))
     return None

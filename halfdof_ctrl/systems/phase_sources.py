@@ -17,7 +17,7 @@ import control
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import HalfdofError
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -30,12 +30,19 @@ from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 SOURCE = "halfdof_source"  #: attribute of a FrequencyResponseData: where its values come from
 PHASE_SOURCES_LARGEST_PENCIL = 300  #: DOFs of a model up to which poles and zeros are those of its pencil
+SAMPLED_WIDTH = 0.05  #: [rad] of the unit circle that a half circle spans
 MOST_REDUCED = 1000  #: states up to which a larger model is reduced for its poles and zeros
 
 
 @dataclass(frozen=True, slots=True)
 class Line:
     """The imaginary axis of the s-plane."""
+
+    widest: float = field(default=np.inf, init=False)  #: [rad/s] interval that a half circle spans, beside its ratio
+
+    def resolution(self, omega: float) -> float:
+        """Return how far rounding moves a point of the axis [rad/s]."""
+        return UNIT_ROUNDOFF * omega
 
     def points(self, exponents: ComplexArray) -> ComplexArray:
         """Return where a response is evaluated for s."""
@@ -52,6 +59,10 @@ class Line:
     def touching(self, roots: ComplexArray) -> ComplexArray:
         """Return the roots on the axis."""
         return np.asarray(roots[roots.real == 0.0])
+
+    def unstable(self, roots: ComplexArray) -> ComplexArray:
+        """Return the roots right of the axis."""
+        return np.asarray(roots[roots.real > 0.0])
 
     def at_start(self, roots: ComplexArray) -> npt.NDArray[np.bool_]:
         """Tell which roots lie at zero frequency."""
@@ -82,6 +93,15 @@ class Circle:
 
     dt: float  #: [s]
 
+    @property
+    def widest(self) -> float:
+        """Interval that a half circle spans [rad/s]: zeros from sampling lie outside the unit circle, near -1."""
+        return SAMPLED_WIDTH / self.dt
+
+    def resolution(self, omega: float) -> float:
+        """Return how far rounding moves a point of the circle [rad/s]."""
+        return UNIT_ROUNDOFF * max(omega, 1.0 / self.dt)
+
     def points(self, exponents: ComplexArray) -> ComplexArray:
         """Return where a response is evaluated for s."""
         return np.asarray(np.exp(exponents * self.dt))
@@ -100,6 +120,10 @@ class Circle:
     def touching(self, roots: ComplexArray) -> ComplexArray:
         """Return the s of the roots on the circle."""
         return self.exponents(roots[self._inside(roots) & (np.abs(np.abs(roots) - 1.0) <= ROUNDED_CIRCLE)])
+
+    def unstable(self, roots: ComplexArray) -> ComplexArray:
+        """Return the roots outside the circle."""
+        return np.asarray(roots[~self._inside(roots)])
 
     def at_start(self, roots: ComplexArray) -> npt.NDArray[np.bool_]:
         """Tell which roots lie at zero frequency."""
