@@ -149,8 +149,7 @@ def _start(base: float, rest: float, *, is_real: bool) -> float:
 def _without_common(
     poles: ComplexArray, doubts: FloatArray, zeros: ComplexArray, plane: Plane
 ) -> tuple[ComplexArray, ComplexArray, ComplexArray]:
-    """Take out zeros with the poles that they cancel; return the poles and zeros left, and zeros beside poles on the
-    boundary.
+    """Take out zeros with the poles that they cancel; return poles and zeros that are left, and boundary pairs' zeros.
 
     On the boundary a pole and a zero side by side turn the phase between them, and cancel elsewhere by themselves.
     Beside both of them values are rounding.
