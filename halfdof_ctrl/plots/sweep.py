@@ -8,10 +8,10 @@ import control
 import numpy as np
 from matplotlib.axes import Axes
 
-from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.doors import require_mapping, require_switches, require_texts, shown, wrong_object
 from halfdof_ctrl.base.errors import ParameterError
-from halfdof_ctrl.base.names import control_labels
+from halfdof_ctrl.base.names import control_labels, force_names, motion_names
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_legend, draw_title, no_lines, prepared_axes
 from halfdof_ctrl.plots.bode import Scales, dress_bode
@@ -21,6 +21,7 @@ from halfdof_ctrl.plots.pole_map import draw_plane
 from halfdof_ctrl.plots.sweep_colours import CaseColours, Numbers, coloured_cases
 from halfdof_ctrl.plots.units import Units, known_units
 from halfdof_ctrl.sweeps.result import SweepResult
+from halfdof_ctrl.systems.phase import phase_by_work
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
 
 Kind: TypeAlias = Literal["bode", "poles"]
@@ -84,6 +85,12 @@ def sweep_plot(
     control.ControlPlot
         ``lines`` has the shape of the axes, and in each entry a line for each case, in order; poles are followed by the
         lines of their branches. More than six values of a numeric parameter have a colour bar, fewer a legend.
+
+    Notes
+    -----
+    A sweep keeps the values of responses and not the models. So the phase of a curve is unwrapped from its samples, and
+    lightly damped resonances between two frequencies may be missed; but that of a DOF at its own force keeps the
+    half circle that passive structures have, on any grid. `bode_plot` of one case has the phase of poles and zeros.
 
     Raises
     ------
@@ -149,13 +156,24 @@ def _draw_curves(
         style = {"color": cases.colours[place], "linewidth": width, "label": _label(cases, place)}
         values, x = curves[place, i, j], scales.frequency(omega)
         lines[2 * i, j] += axes[2 * i, j].plot(x, scales.magnitude(values), **style)
-        lines[2 * i + 1, j] += axes[2 * i + 1, j].plot(x, scales.phase(continuous_phase(values)), **style)
+        lines[2 * i + 1, j] += axes[2 * i + 1, j].plot(x, scales.phase(_phase(result, i, j, values)), **style)
     largest = np.abs(curves).max(axis=0)
     named = control.FrequencyResponseData(
         largest, omega, inputs=list(control_labels(result.inputs)), outputs=list(control_labels(result.outputs))
     )
     dress_bode(axes, named, named, known, scales, grid=grid)
     return lines, axes
+
+
+def _phase(result: SweepResult, output: int, source: int, values: ComplexArray) -> FloatArray:
+    """Return the phase of a channel [rad], of samples, but where a DOF is driven and observed by the work done there."""
+    dofs = result.dofs
+    for order in range(3):
+        motions = dict(zip(motion_names(dofs, order), force_names(dofs), strict=True))
+        if motions.get(result.outputs[output]) == result.inputs[source]:
+            phase = phase_by_work(values, order)
+            return continuous_phase(values) if phase is None else phase
+    return continuous_phase(values)
 
 
 def _signal_units(result: SweepResult, units: Units) -> dict[str, str]:

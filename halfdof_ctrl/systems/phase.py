@@ -189,8 +189,17 @@ def _angle_of_gain(
 def _by_work(model: SecondOrderModel, channel: tuple[int, int], values: ComplexArray) -> FloatArray | None:
     """Return the phase of a motion at the place of its force; None for others, or where no damper takes the work."""
     order = _derivative_at_force(model, *channel)
-    if order is None:
-        return None
+    return None if order is None else phase_by_work(values, order)
+
+
+def phase_by_work(values: ComplexArray, order: int) -> FloatArray | None:
+    """Return the phase [rad] of a derivative of the motion at the place of its force; None where no work is done there.
+
+    Examples
+    --------
+    >>> np.degrees(phase_by_work(np.array([1.0, -1.0, 0.5, -0.1j]), 0)).tolist()
+    [0.0, -180.0, 0.0, -90.0]
+    """
     middle = (order - 1) * np.pi / 2.0
     phase = _on_turn(_angle(values), np.full(values.size, middle))
     outside = np.abs(phase - middle) > np.pi / 2.0 + SIDE

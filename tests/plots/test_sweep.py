@@ -147,6 +147,22 @@ def test_curves_go_on_given_axes() -> None:
     assert axes[0].get_legend() is cplt.legend
 
 
+def test_a_mass_at_its_own_force_keeps_its_side_on_a_coarse_grid() -> None:
+    """Undamped chains, three frequencies: 0 or -180 degrees for the displacement, 180 more for the acceleration."""
+    K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+
+    def chain(k: float) -> SecondOrderModel:
+        return mechss(np.eye(2), None, k * K)
+
+    result = sweep(chain, {"k": [1.0, 3.0]}, omega=[0.1, 1.4, 9.0], inputs="F_q0", outputs=["q0", "q0_ddot", "q1"])
+    cplt = sweep_plot(result)
+    displacements = [line.get_ydata() for line in cplt.lines[1, 0]]
+    assert_allclose(displacements[0], [0.0, -180.0, -180.0], atol=ROUNDING)
+    for one, other in zip(displacements, cplt.lines[3, 0], strict=True):
+        assert_allclose(other.get_ydata(), one + 180.0, atol=ROUNDING)
+    plt.close(cplt.figure)
+
+
 # --- poles
 
 
