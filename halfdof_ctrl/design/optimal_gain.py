@@ -103,7 +103,7 @@ def _solved_in(plant: Plant, method: Solver) -> OptimalGain:
         raise _inaccurate_error(found.error, found.of_effort, poles.values)
     least = np.maximum(poles.bounds, len(poles.values) * UNIT_ROUNDOFF * np.abs(poles.values))
     if (poles.values.real >= -OPTIMAL_GAIN_MARGIN * least).any():
-        raise _unsolved_error(poles.values, float(least[np.argmax(poles.values.real)]))
+        raise _unsolved_error(poles.values, OPTIMAL_GAIN_MARGIN * float(least[np.argmax(poles.values.real)]))
     K, S, own = found.K, found.X, 0.0
     if plant.T is not None:
         K, S, own = K @ plant.T, plant.T.T @ S @ plant.T, COORDINATES * len(S) * UNIT_ROUNDOFF
@@ -153,14 +153,23 @@ def _require_stabilizing_solution(reduction: ExactReduction, plant: Plant) -> No
 
 
 def _unsolved_error(poles: ComplexArray, bound: float | None = None) -> StabilizationError:
-    """Make the refusal where no gain was found although one may exist."""
+    """Make the refusal where no gain was found although one may exist, or one of which it is not known if it does."""
     worst = complex(max(poles.tolist(), key=lambda pole: pole.real))
-    known = "" if bound is None else f", known to {bound:.0e} rad/s"
+    place = complex_in_words(worst, pair=True)
+    if bound is None:
+        fact = (
+            "The solver found no stabilizing gain, although nothing hides a mode from inputs and cost: a pole stays at "
+            f"{place} rad/s"
+        )
+    else:
+        fact = (
+            f"It is uncertain whether a stabilizing gain exists: with the one that was found a pole lies at {place} "
+            f"rad/s, and rounding of the entries of A, B, Q and R may move it by {bound:.0e} rad/s, so that it is "
+            "not told from one on the imaginary axis"
+        )
     msg = (
-        "The solver found no stabilizing gain, although nothing hides a mode from inputs and cost: a pole stays at "
-        f"{complex_in_words(worst, pair=True)} rad/s{known}. Inputs may reach it, or the cost may see it, too little; "
-        "or the weights differ by too many powers of ten: bring Q and R closer together, or place an actuator where "
-        "the mode moves."
+        f"{fact}. Inputs may reach it, or the cost may see it, too little; or the weights differ by too many powers of "
+        "ten: bring Q and R closer together, or place an actuator where the mode moves."
     )
     return StabilizationError(msg, eigenvalue=worst, quantity="Q, R")
 

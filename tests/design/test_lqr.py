@@ -201,6 +201,17 @@ def test_equation_that_is_not_solved_is_refused(monkeypatch: pytest.MonkeyPatch)
         lqr(mechss([[1]], [[0]], [[1]], dofs="y"), displacement={"y": 1.0}, effort={"F_y": 1.0})
 
 
+def test_gain_that_rounding_does_not_tell_from_none_is_refused_as_uncertain() -> None:
+    """An undamped mass of 1 kg at 1 N/m, cost of force r: its poles are to lie 1 / (2 sqrt(r)) left of the axis."""
+    model = mechss([[1]], None, [[1]], dofs="y")
+    feedback = lqr(model, displacement={"y": 1.0}, effort={"F_y": 1e24})
+    assert_allclose(feedback.poles.real, -5e-13, rtol=1e-3)
+    with pytest.raises(
+        StabilizationError, match=r"uncertain whether a stabilizing gain exists.*may move it by .* rad/s"
+    ):
+        lqr(model, displacement={"y": 1.0}, effort={"F_y": 1e32})
+
+
 def test_free_body_in_odd_stiffness_is_refused_whatever_its_rows_sum_to() -> None:
     """Springs of 27 kN/m and 6 mN/m in a row, whose entries are rounded: velocities alone do not see where they are."""
     a, b = 26971.1, 0.00553
