@@ -15,7 +15,8 @@ import numpy as np
 
 from halfdof_ctrl.base.names import listed, name_from_label
 from halfdof_ctrl.design.lqr import StateFeedback
-from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.free_motions import free_motions_in_words
+from halfdof_ctrl.model.second_order import SecondOrderModel, unusual_in_words
 from halfdof_ctrl.parts.mounts import scheme_of
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.check_result import CrossCheck
@@ -100,9 +101,12 @@ def _summary(findings: Findings) -> str:
     model, part = findings.model, findings.reduction.partition
     kinds = (("inertial", part.inertial), ("half", part.half), ("static", part.static))
     split = ", ".join(f"{len(names)} {kind} ({listed(names)})" if names else f"no {kind} ones" for kind, names in kinds)
+    free = free_motions_in_words(model.M, model.C, model.K, model.known_to)
+    unusual = unusual_in_words(model)
     return (
         f"{len(model.dofs)} degrees of freedom: {split}; {findings.reduction.order} states. "
         f"Inputs: {listed(model.inputs)}. Outputs: {listed(model.outputs)}."
+        f"{f' {free}.' if free else ''}{f' Unusual: {unusual}.' if unusual else ''}"
     )
 
 

@@ -92,6 +92,14 @@ def free_motion_count(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, rounding: 
     return FreeMotionCount(free.size, 2 * free.size - resisted, rounding)
 
 
+def free_motions_in_words(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix, rounding: float = EPS) -> str | None:
+    """Say on one line what a stiffness leaves free; None where that is nothing, or the model too large to be asked."""
+    if K.shape[0] > FREE_MOTIONS_LARGEST:
+        return None
+    free = free_motion_count(M, C, K, rounding)
+    return None if free is None else free.in_words()
+
+
 def _symmetric_parts(
     M: ModelMatrix, C: ModelMatrix, K: ModelMatrix
 ) -> tuple[FloatArray, FloatArray, FloatArray] | None:

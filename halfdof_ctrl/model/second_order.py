@@ -28,7 +28,7 @@ from halfdof_ctrl.base.sparse_arrays import (
 )
 from halfdof_ctrl.model.descriptor_form import DescriptorForm, descriptor_form
 from halfdof_ctrl.model.evaluation import checked_points, quadratic_transfer, squeezed
-from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
+from halfdof_ctrl.model.free_motions import free_motions_in_words
 from halfdof_ctrl.model.kinds import split_in_words
 from halfdof_ctrl.model.motion import MotionKind, prescribed_signals, require_free, with_motion_as_input
 from halfdof_ctrl.model.oddities import oddities
@@ -283,19 +283,23 @@ class SecondOrderModel:
         title = f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
         complex_part = f"\n  complex: {', '.join(self.complex_matrices)}" if self.is_complex else ""
         prescribed_part = f"\n  motion prescribed: {listed(self.prescribed)}" if self.prescribed else ""
-        free_part = ""
-        if len(self.dofs) <= FREE_MOTIONS_LARGEST:
-            free = free_motion_count(self.M, self.C, self.K, self.known_to)
-            free_part = f"\n  {free.in_words()}" if free else ""
+        free = free_motions_in_words(self.M, self.C, self.K, self.known_to)
+        free_part = f"\n  {free}" if free else ""
         rounded_part = f"\n  entries known to {self.known_to:.0e}" if self.known_to > EPS else ""
-        found = [] if self.prescribed else oddities({"M": self.M, "C": self.C, "K": self.K}, self.dofs, self.known_to)
-        unusual_part = f"\n  unusual: {'; '.join(found)}" if found else ""
+        found = unusual_in_words(self)
+        unusual_part = f"\n  unusual: {found}" if found else ""
         return (
             f"{title}: {len(self.dofs)} DOFs: {split_in_words(self.M, self.C, self.K)}\n"
             f"  dofs:    {listed(self.dofs)}\n"
             f"  inputs:  {listed(self.inputs)}\n"
             f"  outputs: {listed(self.outputs)}{prescribed_part}{complex_part}{free_part}{rounded_part}{unusual_part}"
         )
+
+
+def unusual_in_words(model: SecondOrderModel) -> str:
+    """Say on one line what is unusual about M, C and K, if no motion is prescribed; nothing where they are as usual."""
+    parts = {} if model.prescribed else {"M": model.M, "C": model.C, "K": model.K}
+    return "; ".join(oddities(parts, model.dofs, model.known_to))
 
 
 def _with_inputs(model: SecondOrderModel, names: Names) -> SecondOrderModel:

@@ -166,7 +166,7 @@ def _draw_curves(
 
 
 def _phase(result: SweepResult, output: int, source: int, values: ComplexArray) -> FloatArray:
-    """Return the phase of a channel [rad]: of samples, but where a DOF is driven and observed by the work done there."""
+    """Return the phase of a channel [rad]: that of samples, but at its own force a motion keeps to the work done."""
     dofs = result.dofs
     for order in range(3):
         motions = dict(zip(motion_names(dofs, order), force_names(dofs), strict=True))

@@ -118,6 +118,21 @@ def test_the_page_says_what_the_paper_says(written: Path) -> None:
 
 
 @pytest.mark.usefixtures("quick")
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.HalfdofWarning")
+def test_the_page_says_what_info_says_of_free_motions_and_odd_matrices(tmp_path: Path) -> None:
+    """Two bodies on a spring float; a follower force makes the stiffness unsymmetric. The mount has neither."""
+    floating = mechss(np.diag([2.0, 1.0]), None, [[5.0, -5.0], [-5.0, 5.0]])
+    follower = mechss(np.eye(2), np.eye(2), [[2.0, 1.0], [-1.0, 3.0]])
+    said = []
+    for name, model in (("floating", floating), ("follower", follower), ("mount", MOUNT)):
+        write_report(model, tmp_path / name)
+        page = Page((tmp_path / name / "index.html").read_text(encoding="utf-8")).text
+        said.append(["1 free motion: 2 poles at exactly 0" in page, "Unusual: K is unsymmetric between" in page])
+        assert [words in repr(model) for words in ("1 free motion: 2 poles", "unusual: K is")] == said[-1]
+    assert said == [[True, False], [False, True], [False, False]]
+
+
+@pytest.mark.usefixtures("quick")
 def test_a_second_report_replaces_the_first_and_spares_other_files(tmp_path: Path) -> None:
     """Files of the user in the folder are left alone."""
     folder = tmp_path / "report"

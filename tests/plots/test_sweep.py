@@ -254,3 +254,12 @@ def test_a_unit_for_nothing_is_refused() -> None:
     """Neither signal nor DOF nor parameter."""
     with pytest.raises(SignalNameError, match="no signal 'z'"):
         sweep_plot(mounts(C_h=[100, 300]), units={"z": "m"})
+
+
+def test_values_that_are_not_there_are_printed_in_full() -> None:
+    """150001 beside 150002 and 150003, all of which four digits call 1.5e+05."""
+    result = mounts(C_h=[150002.0, 150003.0])
+    with pytest.raises(ParameterError, match=r"no case has C_h = 150001\. There are 150002, 150003\."):
+        sweep_plot(result, at={"C_h": 150001.0})
+    assert legend_texts(sweep_plot(result)) == ["C_h = 150002", "C_h = 150003"]
+    plt.close("all")

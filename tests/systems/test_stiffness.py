@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import (
     SecondOrderModel,
@@ -19,7 +20,13 @@ from halfdof_ctrl import (
     transmissibility,
 )
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError, SingularPencilError
-from halfdof_ctrl.systems.stiffness import dynamic_stiffness_response, motion_frequencies, transmissibility_response
+from halfdof_ctrl.systems.phase import response_phase
+from halfdof_ctrl.systems.stiffness import (
+    TransmissibilityKind,
+    dynamic_stiffness_response,
+    motion_frequencies,
+    transmissibility_response,
+)
 from support import exact
 from support.structures import Structure, assembly, damped_structures, on_axis, passive, structures
 
@@ -275,3 +282,21 @@ def test_reciprocal_of_the_static_receptance_at_an_exact_point() -> None:
     model, s = hydromount(), Fraction(1, 2)
     desired = 1 / exact.transfer(model.select("F_y", "y"), float(s))[0, 0, 0]
     assert_allclose(dynamic_stiffness(model, "y", float(s)), desired, rtol=ROUNDOFF)
+
+
+@pytest.mark.parametrize("kind", ["motion", "force"])
+def test_sparse_models_have_the_transmissibility_and_phase_of_dense_ones(kind: TransmissibilityKind) -> None:
+    """A chain of four masses on dampers as sparse matrices: values, and the branch of the phase, whichever is moved."""
+    K = 2.0 * np.eye(4) - np.eye(4, k=1) - np.eye(4, k=-1)
+    dense = mechss(np.diag([1.0, 2.0, 0.0, 1.0]), 0.02 * K, K)
+    sparse = mechss(*map(csc_array, (dense.M, dense.C, dense.K)))
+    assert sparse.is_sparse
+    one, other = (
+        transmissibility_response(model, "q0", "q3", [0.01, 0.7, 1.3, 40.0], kind=kind) for model in (sparse, dense)
+    )
+    assert_allclose(one.frdata, other.frdata, rtol=EXACT)
+    assert_allclose(response_phase(one), response_phase(other), atol=1e-9)
+    assert (one.input_labels, one.output_labels) == (other.input_labels, other.output_labels)
+    stiff, desired = (dynamic_stiffness_response(model, "q0", [0.01, 0.7, 40.0]) for model in (sparse, dense))
+    assert_allclose(stiff.frdata, desired.frdata, rtol=EXACT)
+    assert_allclose(response_phase(stiff), response_phase(desired), atol=1e-9)
