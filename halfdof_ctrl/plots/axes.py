@@ -4,6 +4,7 @@ A signal's unit follows from the model: a DOF's displacement is in m, its deriva
 force on it in N, unless the user says otherwise. Where nothing is known, nothing is claimed.
 """
 
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
@@ -28,6 +29,7 @@ LEGEND = "halfdof_ctrl legend"  #: gid by which a later plot on the same axes fi
 LEGEND_SIZE = 9.0  #: [pt]
 USUAL_WIDTH = 0.95  #: part of the width on which curves lie in the range that is shown in any case
 LEGEND_CHARACTERS = 13.0  #: that fit into an inch of a legend
+MADE_UP = re.compile(r"sys\[\d+\](\$\w+)*")  #: names that python-control makes, also for what it makes of a system
 CIRCLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markerfacecolor": "none", "color": "black"}
 
 
@@ -88,6 +90,12 @@ def _small_text(axes: AxesArray) -> None:
             axis.set_tick_params(labelsize=sizes[f"{letter}tick.labelsize"])
 
 
+def size_in_inches(ax: Axes) -> tuple[float, float]:
+    """Return about how wide and how high axes are, before they are laid out [in]."""
+    place, (width, height) = ax.get_position(), ax.figure.bbox.size / ax.figure.dpi
+    return float(place.width * width), float(place.height * height)
+
+
 def no_lines(axes: AxesArray) -> npt.NDArray[Any]:
     """Return an empty list for each of the axes."""
     lines = np.empty(axes.shape, dtype=object)
@@ -110,8 +118,7 @@ def finished_plot(
     """
     legend = draw_legend(axes, own=own)
     name = system.name or ""
-    made_up = name.startswith("sys[") and name.endswith("]")
-    if title is None and own and not made_up:
+    if title is None and own and not MADE_UP.fullmatch(name):
         title = plain(name_from_label(name))
     if title:
         draw_title(axes, title, own=own)
@@ -210,7 +217,10 @@ def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
         legend.set_gid(LEGEND)
         return legend
     first: Axes = axes[0, 0]
-    return first.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, **style)
+    side, place = (
+        ("left", 0.0) if first.get_yscale() == "log" else ("right", 1.0)
+    )  # a power of ten may stand at the left
+    return first.legend(loc=f"lower {side}", bbox_to_anchor=(place, 1.0), borderaxespad=0.2, **style)
 
 
 def draw_title(axes: AxesArray, title: str, *, own: bool) -> None:

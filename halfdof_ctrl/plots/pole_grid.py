@@ -13,15 +13,21 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, SymmetricalLogLocator
 
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.plots.axes import size_in_inches
 
 WIDE_PLANE = 1e3  #: ratio of the largest to the smallest |s| from which the axes are logarithmic
 FAR_LINES = 20.0  #: times all others, those that swing among them: a point so far out gets logarithmic axes too
 LOGARITHMIC_LABELS = (1e-3, 1e4)  #: numbers outside are written with a power of ten
 DAMPING_RATIOS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 0.95)
 DISCRETE_RATIOS = (0.1, 0.2, 0.3, 0.5, 0.7, 0.9)
-LABELS_APART = 0.13  #: distance between labels of damping ratios, as part of the axes
+LABELS_APART = 0.13  #: distance between labels of lines, as part of the axes ...
+LABEL_INCHES = 0.55  #: ... or across them, where they are small [in]
+TICK_INCHES = (0.5, 0.35)  #: room of a number on the axes, across and up [in]
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
 SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
+FAR_OF_CIRCLE = 4.0  #: times its radius: points farther out would leave the unit circle no room
+BEYOND = "halfdof_ctrl beyond"  #: gid of the text about points beyond the limits
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 GRID_TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -29,9 +35,12 @@ CENTRED: dict[str, Any] = {"ha": "center", "va": "center"}
 
 
 def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete: bool) -> None:
-    """Set scales and limits that show all points, the origin (or unit circle), and some room."""
+    """Set scales and limits that show all points, the origin (or unit circle), and some room.
+
+    Points far out of the unit circle, as sampling makes zeros, are left out; `mark_beyond` says where they are.
+    """
     if discrete:
-        points = np.concatenate([points, [-1.0, 1.0, 1.0j, -1.0j]])
+        points = np.concatenate([points[np.abs(points) <= FAR_OF_CIRCLE], [-1.0, 1.0, 1.0j, -1.0j]])
     size = np.abs(points)
     largest = float(size.max(initial=0.0)) or 1.0
     smallest = float(size[size > 0.0].min(initial=largest))
@@ -39,18 +48,40 @@ def set_pole_axes(ax: Axes, points: npt.NDArray[np.complexfloating], *, discrete
     height = float(np.abs(points.imag).max(initial=0.0))
     if not discrete and (largest > WIDE_PLANE * smallest or _is_squeezed(points)):
         linear = 10.0 ** np.floor(np.log10(smallest))
-        for axis, set_scale in ((ax.xaxis, ax.set_xscale), (ax.yaxis, ax.set_yscale)):
-            set_scale("symlog", linthresh=linear)
-            locator = SymmetricalLogLocator(base=10.0, linthresh=linear)
-            locator.set_params(numticks=6 if axis is ax.xaxis else 9)
-            axis.set_major_locator(locator)
-        ax.set_xlim(min(8.0 * left, -10.0 * linear), max(8.0 * right, linear))
+        across = min(8.0 * left, -10.0 * linear), max(8.0 * right, linear)
         top = max(8.0 * height, 10.0 * linear)
+        room = [inches / least for inches, least in zip(size_in_inches(ax), TICK_INCHES, strict=True)]
+        for axis, set_scale, most in ((ax.xaxis, ax.set_xscale, room[0]), (ax.yaxis, ax.set_yscale, room[1])):
+            set_scale("symlog", linthresh=linear)
+            axis.set_major_locator(_Decades(linear, most))
+        ax.set_xlim(*across)
     else:
         width = max(right - left, 0.1 * height) or 1.0
         ax.set_xlim(min(left - 0.18 * width, -0.7 * width), right + 0.18 * width)
         top = 1.2 * max(height, 0.35 * width)
     ax.set_ylim(-top, top)
+
+
+class _Decades(SymmetricalLogLocator):
+    """Puts zero and powers of ten on a symmetric logarithmic axis, as many as have room, evenly from its ends."""
+
+    def __init__(self, linear: float, most: float) -> None:
+        super().__init__(base=10.0, linthresh=linear)
+        self.linear, self.most = linear, max(most, 2.0)
+        self.set_params(numticks=1000)
+
+    def tick_values(self, vmin: float, vmax: float) -> FloatArray:
+        """Return the ticks between two limits."""
+        every = np.asarray(super().tick_values(vmin, vmax))
+        every = every[(every >= min(vmin, vmax)) & (every <= max(vmin, vmax))]
+        from_zero = np.round(np.log10(np.maximum(np.abs(every) / self.linear, 0.1))) + 1.0  # in lengths of a decade
+        decades = float(from_zero[every > 0.0].max(initial=1.0) + from_zero[every < 0.0].max(initial=1.0))
+        step = float(max(np.ceil(decades / self.most), 1.0))
+        kept = every == 0.0
+        for side in (every > 0.0, every < 0.0):
+            last = from_zero[side].max(initial=0.0)
+            kept |= side & (np.mod(last - from_zero, step) == 0.0) & (from_zero >= step)
+        return np.asarray(every[kept])
 
 
 def _is_squeezed(points: npt.NDArray[np.complexfloating]) -> bool:
@@ -66,11 +97,18 @@ def draw_pole_grid(ax: Axes) -> None:
     reach = float(np.hypot(across, up))
     radii = np.geomspace(min(1e-12 * reach, 1e-3 * across, 1e-3 * up), reach, 900)  # a fast real pole leaves `up` small
     last = _axes_coordinates(ax, 1j * radii)[_inside(ax, 1j * radii)][-1]
+    width, height = size_in_inches(ax)
+    wide, high = LABEL_INCHES / width, 0.3 * LABEL_INCHES / height
     for zeta in DAMPING_RATIOS:
         ray = radii * complex(-zeta, np.sqrt(1.0 - zeta**2))
         inside = _axes_coordinates(ax, ray)[_inside(ax, ray)]
         end = inside[-1] if inside.size else last
-        if np.hypot(*(end - last)) < LABELS_APART or np.hypot(*(end - (0.0, 0.5))) < LABELS_APART:
+        step = np.abs(end - last)
+        if (
+            np.hypot(*step) < LABELS_APART
+            or not (step > (wide, high)).any()
+            or np.hypot(*(end - (0.0, 0.5))) < LABELS_APART
+        ):
             continue
         last = end
         _draw_mirrored(ax, ray)
@@ -86,7 +124,8 @@ def draw_pole_grid(ax: Axes) -> None:
         if length[-1] > LABELS_APART:
             _draw_mirrored(ax, arc)
             middle = path[np.searchsorted(length, 0.5 * length[-1])]
-            if np.hypot(*(middle - last)) > LABELS_APART and middle[0] > EDGE:
+            step = np.abs(middle - last)
+            if np.hypot(*step) > LABELS_APART and (step > (wide, high)).any() and middle[0] > max(EDGE, 0.5 * wide):
                 ax.text(
                     middle[0], middle[1], f"{_number(radius)} rad/s", transform=ax.transAxes, **CENTRED, **GRID_TEXT
                 )
@@ -129,6 +168,16 @@ def mark_multiple(ax: Axes, points: npt.NDArray[np.complexfloating], colour: str
                 color=colour,
             )
         left = left[~same]
+
+
+def mark_beyond(ax: Axes, points: npt.NDArray[np.complexfloating], what: str, colour: str) -> None:
+    """Write the places of points to the left of the limits, or beyond others, at the edge."""
+    beyond = sorted(points[~_inside(ax, points)].tolist(), key=abs)
+    if beyond:
+        places = listed([f"{value.real:.4g}" if value.imag == 0.0 else f"{value:.4g}" for value in beyond], most=4)
+        place = 0.02, 0.02 + 0.06 * sum(text.get_gid() == BEYOND for text in ax.texts)
+        text = ax.text(*place, f"{what} beyond: {places}", transform=ax.transAxes, color=colour, fontsize="small")
+        text.set_gid(BEYOND)
 
 
 def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:

@@ -16,7 +16,7 @@ from halfdof_ctrl.descriptor.zeros import zeros
 from halfdof_ctrl.design.lqr import StateFeedback
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.axes import AxesLike, finished_plot, legend_prefix, no_lines, prepared_axes, require_system
-from halfdof_ctrl.plots.pole_grid import draw_discrete_grid, draw_pole_grid, mark_multiple, set_pole_axes
+from halfdof_ctrl.plots.pole_grid import draw_discrete_grid, draw_pole_grid, mark_beyond, mark_multiple, set_pole_axes
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
@@ -69,7 +69,7 @@ def pole_map_plot(
     control.ControlPlot
         ``lines[0, 0]`` holds the markers in the order of the legend, without the grid. The axes are
         logarithmic (symlog) where the moduli span more than three decades, or where a fast point would leave those that
-        swing no room.
+        swing no room; the z-plane shows the unit circle, and says in words what lies four times as far out.
 
     Raises
     ------
@@ -100,6 +100,8 @@ def pole_map_plot(
         lines[0, 0] += plane.plot(points.real, points.imag, label=prefix + text, linestyle="none", **style)
         if style["marker"] == "x":
             mark_multiple(plane, points, style["color"])
+        if discrete:
+            mark_beyond(plane, points, text, style["color"])
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
 
 

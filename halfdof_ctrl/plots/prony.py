@@ -8,7 +8,7 @@ import numpy as np
 from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.parts.prony import PronyFit, counted
-from halfdof_ctrl.plots.axes import AxesLike, draw_grid, draw_legend, label_y, no_lines, prepared_axes
+from halfdof_ctrl.plots.axes import AxesLike, draw_grid, draw_legend, draw_title, label_y, no_lines, prepared_axes
 
 CURVE_POINTS = 400  #: frequencies of the curves
 
@@ -70,12 +70,10 @@ def prony_plot(
             drawn += panel.semilogx(f, part(values), style, label=label)
         lines[row, 0] = drawn
         label_y(panel, f"K{chr(39) * (row + 1)} [{unit}]")
+        panel.ticklabel_format(axis="y", style="sci", scilimits=(-2, 5), useMathText=True)
+        panel.yaxis.get_offset_text().set_fontsize("small")
     axes[1, 0].set_xlabel("frequency [Hz]")
     draw_grid(axes[:, 0], on=grid)
     legend = draw_legend(axes, own=ax is None)
-    heading = f"{counted(fit.k.size)}, rms {fit.rms:.1e}" if title is None else title
-    if ax is None:
-        axes[0, 0].figure.suptitle(heading)
-    else:
-        axes[0, 0].set_title(heading)
+    draw_title(axes, f"{counted(fit.k.size)}, rms {fit.rms:.1e}" if title is None else title, own=ax is None)
     return control.ControlPlot(lines, axes, axes[0, 0].figure, legend=legend)

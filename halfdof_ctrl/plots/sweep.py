@@ -16,7 +16,7 @@ from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.plots.axes import AxesArray, AxesLike, draw_legend, draw_title, no_lines, prepared_axes
 from halfdof_ctrl.plots.bode import Scales, dress_bode
 from halfdof_ctrl.plots.branches import followed
-from halfdof_ctrl.plots.pole_grid import set_pole_axes
+from halfdof_ctrl.plots.pole_grid import mark_beyond, set_pole_axes
 from halfdof_ctrl.plots.pole_map import draw_plane
 from halfdof_ctrl.plots.sweep_colours import CaseColours, Numbers, coloured_cases
 from halfdof_ctrl.plots.units import Units, known_units
@@ -197,6 +197,8 @@ def _draw_poles(result: SweepResult, cases: CaseColours, ax: AxesLike, *, grid: 
     if not plane.has_data():
         set_pole_axes(plane, shown[~np.isnan(shown)], discrete=result.discrete)
         draw_plane(plane, grid=grid, discrete=result.discrete)
+        if result.discrete:
+            mark_beyond(plane, shown[~np.isnan(shown)], "poles", "0.3")
     ways = _ways(result, cases)
     ends = {number: style for way in ways for number, style in ((way[0], FIRST_CASE), (way[-1], LAST_CASE))}
     for place, number in enumerate(cases.numbers.tolist()):

@@ -1,5 +1,9 @@
 """The pole map by the data in its lines, its labels and legend."""
 
+import itertools
+
+import control
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -103,3 +107,28 @@ def test_axes_of_a_pole_map_carry_units() -> None:
     assert "[rad/s]" in ax.get_ylabel()
     sampled = pole_map_plot(mech2ss(mount()).sample(0.02)).axes[0, 0]
     assert sampled.get_xlabel() == "real part of z [-]"
+
+
+def test_zeros_far_out_of_the_unit_circle_are_told_in_words_and_leave_it_its_room() -> None:
+    """A zero at -30 of ``(z + 30) / ((z - 0.5) (z - 0.9))``."""
+    sampled = control.ss([[0.5, 1.0], [0.0, 0.9]], [[0.0], [1.0]], [[30.5, 1.0]], [[0.0]], 0.1)
+    cplt = pole_map_plot(sampled)
+    plane = cplt.axes[0, 0]
+    assert plane.get_xlim()[0] > -2.0
+    assert [text.get_text() for text in plane.texts if "beyond" in text.get_text()] == ["zeros beyond: -30"]
+    plt.close(cplt.figure)
+
+
+@pytest.mark.parametrize("width", [3.5, 6.0, 14.0])
+def test_powers_of_ten_on_an_axis_have_room(width: float) -> None:
+    """Poles from 1 to 1e12 rad/s, on axes of any width: numbers do not overlap, and the largest decade has one."""
+    figure, ax = plt.subplots(figsize=(width, 3.0), layout="constrained")
+    pole_map_plot(control.ss(np.diag([-1.0, -1e12]), [[1.0], [1.0]], [[1.0, 1.0]], [[0.0]]), ax=ax)
+    figure.canvas.draw()
+    low, high = ax.get_xlim()
+    labels = [label for label in ax.get_xticklabels() if low <= label.get_position()[0] <= high]
+    boxes = [label.get_window_extent() for label in labels]
+    assert len(boxes) > 2
+    assert all(one.x1 <= other.x0 for one, other in itertools.pairwise(boxes))
+    assert ax.get_xticks().min() == -1e12
+    plt.close(figure)
