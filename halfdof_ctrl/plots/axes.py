@@ -92,8 +92,8 @@ def _small_text(axes: AxesArray) -> None:
 
 def size_in_inches(ax: Axes) -> tuple[float, float]:
     """Return about how wide and how high axes are, before they are laid out [in]."""
-    place, (width, height) = ax.get_position(), ax.figure.bbox.size / ax.figure.dpi
-    return float(place.width * width), float(place.height * height)
+    place, whole, dpi = ax.get_position(), ax.figure.bbox, ax.figure.dpi
+    return float(place.width * whole.width / dpi), float(place.height * whole.height / dpi)
 
 
 def no_lines(axes: AxesArray) -> npt.NDArray[Any]:
@@ -217,10 +217,12 @@ def draw_legend(axes: AxesArray, *, own: bool) -> Legend | None:
         legend.set_gid(LEGEND)
         return legend
     first: Axes = axes[0, 0]
-    side, place = (
-        ("left", 0.0) if first.get_yscale() == "log" else ("right", 1.0)
-    )  # a power of ten may stand at the left
-    return first.legend(loc=f"lower {side}", bbox_to_anchor=(place, 1.0), borderaxespad=0.2, **style)
+    if first.get_yscale() == "log":
+        style |= {"loc": "lower left", "bbox_to_anchor": (0.0, 1.0)}
+    else:  # a power of ten may stand at the left
+        style |= {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    beside: Legend = first.legend(borderaxespad=0.2, **style)
+    return beside
 
 
 def draw_title(axes: AxesArray, title: str, *, own: bool) -> None:
