@@ -32,7 +32,7 @@ from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visib
 from halfdof_ctrl.systems.doors import checked_system
 from halfdof_ctrl.systems.hessenberg import state_space_response
 from halfdof_ctrl.systems.origin import poles_of_model
-from halfdof_ctrl.systems.pencil_poles import pencil_poles
+from halfdof_ctrl.systems.pencil_poles import pencil_poles, sharpened
 from halfdof_ctrl.systems.phase_sources import source_of, with_source
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 from halfdof_ctrl.systems.seen_modes import (
@@ -236,7 +236,7 @@ def system_modes(
     """Find which poles of a continuous state space and a polynomial part are seen, and the zeros of its channels."""
     data = StateSpaceData.of(sys)
     A, D = data.A, data.D
-    poles = bounded_poles(A) if model is None else poles_of_model(model, A)
+    poles = bounded_poles(A) if model is None else sharpened(poles_of_model(model, A), model)
     if len(A) > MOST_CIRCLED:
         return seen_by_vectors(*data, poles), np.zeros(0, dtype=np.complex128)
     p, m = D.shape

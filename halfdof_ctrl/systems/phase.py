@@ -29,6 +29,8 @@ ZERO_ON_AXIS = 1e-9  #: of its size: a zero nearer to the axis is on it
 CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a motion that is not reached
 SAME = 1e-15  #: of its size: poles and zeros nearer than this are at one place
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
+AGREES_IN_SIZE = 1e-2  #: between the logarithms of their sizes
+UNSURE = 0.1  #: [rad] by which bounds of poles may turn phi: where they may do more, nothing is compared
 BESIDE_POLE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
 PHASE_BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
 POLE_EFFORT = 1.1e9  #: cubed size up to which poles are computed
@@ -109,25 +111,38 @@ def _by_roots(
     p = plane.on_boundary(poles.values, ON_AXIS * poles.bounds)
     z = plane.on_boundary(zeros, ZERO_ON_AXIS * np.abs(zeros))
     p, z, close = _without_common(p, ON_AXIS * poles.bounds, z, plane)
-    gain = _angle_of_gain(source, channel, p, z)
+    gain = _gain(source, channel, p, z)
     if gain is None:
         return None
     slow_z, slow_p = plane.at_start(z), plane.at_start(p)
     base = 0.5 * np.pi * float(np.count_nonzero(slow_z) - np.count_nonzero(slow_p))
     none = np.zeros(1)
     begin = float((plane.swept(none, z[~slow_z]) - plane.swept(none, p[~slow_p]))[0])
-    rest = _start(base, gain + plane.constant(z) - plane.constant(p) + begin, is_real=source.is_real)
+    rest = _start(base, gain.imag + plane.constant(z) - plane.constant(p) + begin, is_real=source.is_real)
     phi = plane.swept(omega, z) - plane.swept(omega, p) - begin + rest
     angle = _angle(values)
     away = np.ones(omega.size, dtype=bool)
     for roots, beside in ((p, BESIDE_POLE), (np.append(z, close), PHASE_BESIDE_ZERO)):
         for root in plane.touching(roots):
             away &= np.abs(omega - root.imag) > beside * omega
-    difference = np.abs(_wrapped(angle - phi))[away]
-    if not np.nan_to_num(difference).max(initial=0.0) < AGREES:
+    points = plane.points(np.asarray(1j * omega, dtype=np.complex128))
+    doubt = _doubt(points, poles)
+    sure = away & (doubt < UNSURE) & ~np.isnan(angle)
+    turned = np.abs(_wrapped(angle - phi))[sure] - ON_AXIS * doubt[sure]
+    grown = np.abs(np.log(np.abs(values[sure])) - _log_size(points[sure], p, z, gain)) - ON_AXIS * doubt[sure]
+    if not (turned.max(initial=0.0) < AGREES and grown.max(initial=0.0) < AGREES_IN_SIZE):
         return None
     sides = [plane.swept(omega * shift, z) - plane.swept(omega * shift, p) - begin + rest for shift in BOTH_SIDES]
     return _on_turn(angle, np.where(away, phi, _nearer(angle, *sides)))
+
+
+def _doubt(points: ComplexArray, poles: BoundedPoles) -> FloatArray:
+    """Return by how much the bounds of poles may turn the phase [rad]: much beside those that lie close to the axis."""
+    doubt = np.zeros(points.size)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        for pole, bound in zip(poles.values.tolist(), poles.bounds.tolist(), strict=True):
+            doubt += np.minimum(bound / np.abs(points - pole), 1.0) if bound else 0.0
+    return np.nan_to_num(doubt, nan=1.0)
 
 
 def _nearer(angle: FloatArray, first: FloatArray, second: FloatArray) -> FloatArray:
@@ -175,15 +190,23 @@ def _without_common(
     return poles[left], np.array(kept, dtype=np.complex128), np.array(close, dtype=np.complex128)
 
 
-def _angle_of_gain(
-    source: KnownSource, channel: tuple[int, int], poles: ComplexArray, zeros: ComplexArray
-) -> float | None:
-    """Return the angle of k in ``H = k prod(s - z) / prod(s - p)``, from one real point; None where there is none."""
+def _gain(source: KnownSource, channel: tuple[int, int], poles: ComplexArray, zeros: ComplexArray) -> complex | None:
+    """Return log k in ``H = k prod(s - z) / prod(s - p)``, from one real point; None where there is none."""
     point = source.plane.gain_point(np.concatenate([poles, zeros]))
     value = complex(source.response(*channel, np.array([point], dtype=np.complex128))[0])
     if not np.isfinite(value) or value == 0.0:
         return None
-    return float(np.angle(value) + np.angle(point - poles).sum() - np.angle(point - zeros).sum())
+    return complex(np.log(value) + np.log(point - poles).sum() - np.log(point - zeros).sum())
+
+
+def _log_size(points: ComplexArray, poles: ComplexArray, zeros: ComplexArray, gain: complex) -> FloatArray:
+    """Return log size of H by poles and zeros; the angles alone do not tell four zeros at the origin from none."""
+    size = np.full(points.size, gain.real)
+    with np.errstate(divide="ignore"):
+        for roots, sign in ((zeros, 1.0), (poles, -1.0)):
+            for root in roots.tolist():
+                size += sign * np.log(np.abs(points - root))
+    return size
 
 
 def _by_work(model: SecondOrderModel, channel: tuple[int, int], values: ComplexArray) -> FloatArray | None:

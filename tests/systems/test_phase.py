@@ -194,3 +194,19 @@ def test_sampled_undamped_channels_keep_their_phase_deep_in_roll_off(step: float
     assert_allclose(degrees(frequency_response(sampled, few))[[0, -1]], fine[[0, -1]], atol=1e-3)
     assert_allclose(fine[-1], -180.0 * (output + 1) - 90.0, atol=0.5)
     assert_allclose(np.interp(0.2, grid, fine), -np.degrees(0.1 * step), atol=0.5)  # half a step late
+
+
+def test_zeros_that_rounding_puts_to_the_origin_are_found_out_on_a_coarse_grid() -> None:
+    """A weak damper beside stiff springs: four zeros at 0 in the place of two pairs would add 360 degrees.
+
+    Six points above all resonances, where four zeros at the origin turn the angle by nothing: work done on the
+    structure keeps its phase between 0 and -180.
+    """
+    a, b, c = 8.390263365242013e-11, 7.323344703441913e-06, 6.66616143230613e-10
+    p, q, r = 0.012590395654810672, 204544.09983366603, 12.791100221293235
+    model = mechss(
+        np.diag([0.0, 0.02357046078500336, 0.0, 9.48770854684601]),
+        [[a, -a, 0.0, 0.0], [-a, a + b, -b, 0.0], [0.0, -b, b + c, -c], [0.0, 0.0, -c, c]],
+        [[2.695043942927987, -p, 0.0, 0.0], [-p, p + q, -q, 0.0], [0.0, -q, q + r, -r], [0.0, 0.0, -r, 162.87518680]],
+    ).select("F_q0", "q0")
+    assert_allclose(degrees(frequency_response(model, [0.657, 183.0, 16258.0, 2e5, 2.3e6])), 0.0, atol=1e-2)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.optimize import linear_sum_assignment
 
-from halfdof_ctrl import exact_reduction, mech2ss, mechss
+from halfdof_ctrl import exact_reduction, frequency_response, mech2ss, mechss
 from halfdof_ctrl.systems.origin import poles_of_model
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
 from halfdof_ctrl.systems.pole_bounds import BoundedPoles, bounded_poles
@@ -110,3 +110,22 @@ def test_equal_undamped_oscillators_keep_their_digits() -> None:
     poles = bounded_poles(turn @ np.kron(np.eye(3), [[0.0, 1.0], [-1.0, 0.0]]) @ inverse)
     assert worst(poles, [1j, 1j, 1j, -1j, -1j, -1j]) <= 1.0
     assert poles.bounds.max() < 1e-10
+
+
+def test_poles_that_a_state_matrix_loses_beside_a_fast_one_come_from_the_pencil() -> None:
+    """A damper of 1e-12 N s/m at a massless node makes a pole of 4e17 rad/s; a mode of 61 rad/s is below its rounding.
+
+    In exact arithmetic the masses swing at 8.679 and at 60.996 rad/s.
+    """
+    k, s, g = 55.91377692982338, 656227.6245830412, 2.4745626933873e-3
+    model = mechss(
+        np.diag([0.03404259257474761, 0.0, 0.4018830082009365]),
+        [[2.240882217262969e-06, -1.5e-12, 0.0], [-1.5e-12, 1.5e-12, 0.0], [0.0, 0.0, 0.0]],
+        [[124.48713971650548, -k, 0.0], [-k, s + k, -s], [0.0, -s, s + g]],
+    )
+    poles = pencil_poles(model)
+    assert_allclose(np.sort(np.abs(poles.values))[:4], [8.679, 8.679, 60.996, 60.996], rtol=1e-3)
+    assert poles.bounds[np.abs(poles.values) < 100.0].max() < 1e-6
+    omega = np.asarray(frequency_response(model.select("F_q1", "q0")).omega)
+    mode = np.sort(np.abs(poles.values))[3]
+    assert np.abs(omega / mode - 1.0).min() < 1e-6
