@@ -33,6 +33,7 @@ SOUND_BOUND = (
 SOUND_STORED = 1e-9  #: the same over rcond(W), which rounding of A and B is enlarged by; it exceeds that some 30 times
 SOUND_RESPONSE = 2e-11  #: relative error at tested points up to which a model stays with the states it has
 FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
+SOLVING_EFFORT = 1e9  #: points times cubed DOFs up to which refined solves take the place of both evaluations
 MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
 
 
@@ -135,7 +136,8 @@ def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArra
     """Evaluate a model in energy coordinates, and keep what DOF states gave where that is better.
 
     Which is better tell refined solves of the descriptor form at a few of the points where they differ, and those
-    values are taken themselves. A large model stays in energy coordinates if they are right wherever it is tested.
+    values are taken themselves; all of them where neither is right at one of the few, up to a size. A large model
+    stays in energy coordinates if they are right wherever it is tested.
 
     Parameters
     ----------
@@ -164,6 +166,8 @@ def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArra
     nearest = np.abs(np.arange(points.size)[:, None] - tested).argmin(axis=1)
     worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
     values = np.where(doubt & worse[:, :, nearest], others, values)
+    if not _agree(values[:, :, tested], exact) and doubtful.size * len(form.model.dofs) ** 3 <= SOLVING_EFFORT:
+        tested, exact = doubtful, refined_response(form.model, points[doubtful])
     values[:, :, tested] = np.where(doubt[:, :, tested] & np.isfinite(exact), exact, values[:, :, tested])
     return values
 
@@ -174,9 +178,12 @@ def _is_sound(model: SecondOrderModel, values: ComplexArray, points: ComplexArra
     with np.errstate(invalid="ignore"):
         extremes = [int(np.nanargmin(size.min(axis=0))), int(np.argmax(np.nan_to_num(size, posinf=0.0).max(axis=0)))]
     tested = np.unique(np.append(_spread(points.size), extremes))
-    exact = refined_response(model, points[tested])
-    known = np.isfinite(exact) & np.isfinite(values[:, :, tested])
-    return bool((np.abs(values[:, :, tested] - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
+    return _agree(values[:, :, tested], refined_response(model, points[tested]))
+
+
+def _agree(values: ComplexArray, exact: ComplexArray) -> bool:
+    known = np.isfinite(exact) & np.isfinite(values)
+    return bool((np.abs(values - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
 
 
 def _spread(count: int) -> IndexArray:
