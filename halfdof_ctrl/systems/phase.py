@@ -30,6 +30,9 @@ CANCELLED = 1e-9  #: of its size: a zero so near to a pole is the pole of a moti
 SAME = 1e-15  #: of its size: poles and zeros nearer than this are at one place
 AGREES = 1e-3  #: [rad] between phi and the angle of the values
 AGREES_IN_SIZE = 1e-2  #: between the logarithms of their sizes
+GARBLED = 1.0  #: the same of a value that is rounding, fifty decades below the largest, or beside a needle ...
+MOST_GARBLED = 0.05  #: ... of which so many, as part of all, ...
+LONGEST_GARBLED = 2  #: ... and so many side by side say nothing about poles and zeros
 UNSURE = 0.1  #: [rad] by which bounds of poles may turn phi: where they may do more, nothing is compared
 BESIDE_POLE = 1e-9  #: relative distance to a pole on the axis within which the angle says nothing
 PHASE_BESIDE_ZERO = 1e-7  #: the same for a zero, where the value is rounding
@@ -130,10 +133,21 @@ def _by_roots(
     sure = away & (doubt < UNSURE) & ~np.isnan(angle)
     turned = np.abs(_wrapped(angle - phi))[sure] - ON_AXIS * doubt[sure]
     grown = np.abs(np.log(np.abs(values[sure])) - _log_size(points[sure], p, z, gain)) - ON_AXIS * doubt[sure]
+    sound = ~_garbled(grown)
+    turned, grown = turned[sound], grown[sound]
     if not (turned.max(initial=0.0) < AGREES and grown.max(initial=0.0) < AGREES_IN_SIZE):
         return None
     sides = [plane.swept(omega * shift, z) - plane.swept(omega * shift, p) - begin + rest for shift in BOTH_SIDES]
     return _on_turn(angle, np.where(away, phi, _nearer(angle, *sides)))
+
+
+def _garbled(grown: FloatArray) -> npt.NDArray[np.bool_]:
+    """Tell which values are rounding: single ones, or two side by side, among many that have the size of the roots."""
+    garbled = grown > GARBLED
+    edges = np.diff(np.concatenate([[False], garbled, [False]]).astype(int))
+    runs = np.flatnonzero(edges == -1) - np.flatnonzero(edges == 1)
+    few = np.count_nonzero(garbled) <= MOST_GARBLED * garbled.size and runs.max(initial=0) <= LONGEST_GARBLED
+    return garbled & bool(few and not garbled[-1:].any())
 
 
 def _doubt(points: ComplexArray, poles: BoundedPoles) -> FloatArray:
