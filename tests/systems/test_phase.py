@@ -210,3 +210,12 @@ def test_zeros_that_rounding_puts_to_the_origin_are_found_out_on_a_coarse_grid()
         [[2.695043942927987, -p, 0.0, 0.0], [-p, p + q, -q, 0.0], [0.0, -q, q + r, -r], [0.0, 0.0, -r, 162.87518680]],
     ).select("F_q0", "q0")
     assert_allclose(degrees(frequency_response(model, [0.657, 183.0, 16258.0, 2e5, 2.3e6])), 0.0, atol=1e-2)
+
+
+def test_single_values_of_rounding_do_not_speak_against_the_roots() -> None:
+    """Of a hundred values one or two side by side may be garbled; three of them, the last ones or many are a fault."""
+    grown = np.zeros(100)
+    for places, told in (([7], 1), ([7, 8, 40], 3), ([7, 8, 9], 0), ([98, 99], 0), (range(0, 100, 9), 0)):
+        changed = grown.copy()
+        changed[list(places)] = 30.0
+        assert phase._garbled(changed).sum() == told
