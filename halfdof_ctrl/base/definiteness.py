@@ -80,10 +80,12 @@ def inertia(matrix: csc_array, largest: int = LARGEST_COMPONENT, known_to: float
     sizes = np.bincount(label, minlength=count)
     if sizes.min() > max(DENSE_SIZE, largest):
         return Inertia(positive=0, negative=0, zero=0, unknown=matrix.shape[0])
-    symmetric = csc_array((matrix + matrix.T) / 2)
+    symmetric = csc_array(matrix / 2 + matrix.T / 2)
     order = np.argsort(label, kind="stable")
     first = np.cumsum(sizes) - sizes
     scaled = csc_array(csc_array(_at_unit_diagonal(symmetric)[order])[:, order])
+    if not np.isfinite(scaled.data).all():  # numbers that float64 cannot scale, as 1e300 beside 1e-300
+        return Inertia(positive=0, negative=0, zero=0, unknown=matrix.shape[0])
     zero = max(ZERO_VALUE, known_to * float(abs(scaled).sum(axis=0).max())) if known_to > EPS else ZERO_VALUE
     lowest = np.inf
     signs = np.zeros(3, dtype=np.int64)

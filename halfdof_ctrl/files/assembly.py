@@ -5,7 +5,7 @@ other matrices have follows. What the files do not say is told in the report, no
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -87,6 +87,7 @@ def read_matrices(
     """
     found = find_sources(given, matrices or {})
     raws = {letter: _completed(letter, source, triangle) for letter, source in found.matrices.items()}
+    raws = _compared(found, raws)
     square, dofs, notes = _aligned(found, raws)
     names = dofs or tuple([f"q{index}" for index in range(next(iter(square.values())).shape[0])])
     require_clear_letters(found, len(names), matrices or {}, given)
@@ -111,6 +112,7 @@ def read_matrices(
         files=tuple([path.name for path in found.files]),
         labelled=dofs is not None,
         signals=tuple([_origin(letter, source) for letter, source in taken_signals(found, signals).items()]),
+        doubts=tuple([f"{source.words} {doubt}" for source in found.signals.values() for doubt in source.raw.doubts]),
         unused=_unused(found, signals),
         similar=_similar(found, raws, [letter for letter, name in (matrices or {}).items() if name is None]),
         known_to=rounding,
@@ -220,6 +222,26 @@ def _aligned(found: Sources, raws: Mapping[str, RawMatrix]) -> tuple[Matrices, t
             square[letter] = _moved(matrix, np.array([union[name] for name in own]), n)
     notes += _differences(names, labelled)
     return {letter: square[letter] for letter in ("M", "C", "K", "S") if letter in square}, every or None, notes
+
+
+def _compared(found: Sources, raws: Mapping[str, RawMatrix]) -> dict[str, RawMatrix]:
+    """Doubt a matrix that does not have its entries where those of the same run have them."""
+    compared = dict(raws)
+    written = {letter: raw.places for letter, raw in raws.items() if raw.places is not None}
+    first = next(iter(written), "")
+    for letter, places in list(written.items())[1:]:
+        other = written[first]
+        if other is None or places is None or raws[letter].matrix.shape != raws[first].matrix.shape:
+            continue
+        different = np.setxor1d(places, other, assume_unique=True)
+        if different.size:
+            row, column = divmod(int(different[0]), raws[letter].matrix.shape[0])
+            doubt = (
+                f"and {found.matrices[first].path.name} should have lines for the same places, but {different.size} "
+                f"are in one of them alone, the first in row {row + 1} and column {column + 1}: lines were lost"
+            )
+            compared[letter] = replace(raws[letter], doubts=(*raws[letter].doubts, doubt))
+    return compared
 
 
 def _union(labels: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
@@ -337,6 +359,7 @@ def _report(
     files: tuple[str, ...],
     labelled: bool,
     signals: tuple[str, ...] = (),
+    doubts: tuple[str, ...] = (),
     unused: tuple[str, ...] = (),
     similar: tuple[str, ...] = (),
     known_to: float = EPS,
@@ -359,6 +382,7 @@ def _report(
         labelled=labelled,
         missing=tuple([letter for letter in REQUIRED if letter not in square]),
         signals=signals,
+        doubts=doubts,
         unused=unused,
         similar=similar,
         known_to=known_to,

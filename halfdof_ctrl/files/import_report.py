@@ -80,6 +80,7 @@ class ImportReport:
     labelled: bool  #: whether the files name their DOFs
     missing: tuple[str, ...]  #: letters among M, C, K for which there is no matrix
     signals: tuple[str, ...]  #: B, F, G, H, D that are read, and from where
+    doubts: tuple[str, ...]  #: what may be wrong with the files of these
     unused: tuple[str, ...]  #: what else is in the files
     similar: tuple[str, ...]  #: of that, what is as large as the stiffness
     known_to: float  #: relative rounding of the entries by the digits of the files
@@ -103,7 +104,8 @@ class ImportReport:
             for part in self.matrices
             if part.half_stored
         ]
-        found += [f"{part.source} {doubt}." for part in self.matrices for doubt in part.doubts]
+        doubts = [f"{part.source} {doubt}" for part in self.matrices for doubt in part.doubts]
+        found += [f"{doubt}." for doubt in (*doubts, *self.doubts)]
         found += [
             f"{part.letter} ({part.source}) is {part.inertia.in_words}: {part.inertia.negative} eigenvalues of its "
             f"symmetric part are negative{_beyond_rounding(part)}."

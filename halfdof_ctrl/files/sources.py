@@ -302,7 +302,7 @@ def _read_labels(path: Path, content: bytes) -> tuple[str, ...]:
 def _letter(path: Path, raw: RawMatrix, role: FileRole | None) -> str | None:
     """Tell what a matrix is by the file's own words, then by the file's name."""
     if raw.format.startswith("Nastran"):
-        return nastran_letter(raw.title)
+        return None if raw.rectangular else nastran_letter(raw.title)
     if raw.letter is not None:
         return raw.letter
     if path.stem in SIGNALS:

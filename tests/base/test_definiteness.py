@@ -108,3 +108,10 @@ def test_signs_have_words(diagonal: list[float], words: str) -> None:
 def test_only_the_symmetric_part_counts() -> None:
     """A gyroscopic part does no work."""
     assert counts(inertia(csc_array([[1.0, 5.0], [-5.0, 1.0]]))) == (2, 0, 0, 0)
+
+
+def test_numbers_that_cannot_be_scaled_leave_the_signs_unknown() -> None:
+    """A diagonal of 1e-300 beside entries of 1e300, as damaged bytes are; sums of 1e308 do not overflow."""
+    found = inertia(csc_array(np.array([[1e-300, 1e300], [1e300, 1.0]])))
+    assert (found.unknown, found.in_words) == (2, "not determined")
+    assert inertia(csc_array(np.array([[1.5e308, 0.0], [0.0, 1.0]]))).positive == 2

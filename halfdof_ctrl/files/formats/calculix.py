@@ -3,8 +3,8 @@
     job.sti, job.mas     row, column, value: the upper triangle of stiffness and mass, 14 digits, zeros among them
     job.dof              a line for each row: node.DOF, as 5.1
 
-Constrained DOFs are not in the files. Zeros are written too, so that each row has its lines in both, and a file with
-fewer rows than the ``.dof`` file names was cut short.
+Constrained DOFs are not in the files. Zeros are written too, so that both have lines for the same places, each row
+among them, and a file with fewer rows than the ``.dof`` file names was cut short.
 
 Source: CalculiX CrunchiX User's Manual, ``*FREQUENCY``, and the routine ``matrixstorage``.
 """
@@ -74,6 +74,7 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
         format="CalculiX",
         letter=KIND_BY_ENDING[ending],
         known_to=known_to(content),
+        places=np.unique(places[:, 0] * size + places[:, 1]),
     )
 
 

@@ -6,13 +6,15 @@
 
 Entries come in fields of 8 characters, of 16 (``*``), or between commas. Form 6 is symmetric and one entry of each pair
 is written, 1 square, 2 and 9 rectangular; TIN 3, 4 is complex, with POLAR as amplitude and phase [deg]. Component 0 is
-a scalar point. INCLUDE statements are not followed, and told. A name may stand more than once.
+a scalar point. Columns of form 9 are numbered from 1 to NCOL, with component 0, or named as rows are. Nastran punches
+NCOL for square matrices too, as the number of DOFs of the set that they belong to. INCLUDE statements are not followed,
+and told. A name may stand more than once.
 
 Source: MSC Nastran Quick Reference Guide, entries DMIG and EXTRN.
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -23,15 +25,16 @@ from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.dmig_punch import MOST_COMPONENT, PUNCH_COMPONENT_BITS, extrn_labels, punched_matrices
 from halfdof_ctrl.files.formats.labels import distinct, dof_names
-from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled
+from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled, most_rows
 from halfdof_ctrl.files.formats.text_blocks import printable
 
 Keys: TypeAlias = npt.NDArray[np.int64]
 
 SMALL, LARGE = 8, 16  #: characters of a field
 SYMMETRIC, SQUARE_FORMS, COMPLEX_TYPES = 6, (1, 6), (3, 4)
+RECTANGULAR = 9  #: form whose columns have numbers
 FORMS, TYPES = (1, 2, 6, 9), (0, 1, 2, 3, 4)
-POLAR_FIELD = 5
+POLAR_FIELD, COUNT_FIELD = 5, 7
 NO_KIND = "which are none that DMIG has"
 LARGEST_NODE = 2**60
 EXPONENT = re.compile(r"(?<=[0-9.])([+-])")  #: 1.5-3 and 1.5D-3 are 1.5e-3
@@ -48,6 +51,8 @@ class _Entries:
     form: int
     is_complex: bool
     is_polar: bool
+    n_columns: int  #: NCOL, 0 if the header does not say it
+    stray: str = ""  #: another entry between the columns
     row_keys: list[int] = field(default_factory=list)
     column_keys: list[int] = field(default_factory=list)
     parts: list[tuple[float, float]] = field(default_factory=list)  #: real and imaginary, or amplitude and phase
@@ -93,12 +98,13 @@ def _has_word(content: bytes, word: bytes) -> bool:
 
 
 def read_dmig(content: bytes) -> list[RawMatrix]:
-    r"""Read all square matrices of a file.
+    r"""Read all matrices of a file, square ones first.
 
     Raises
     ------
     FileFormatError
-        An entry whose nodes, components or values are no numbers, or that has no header; no square matrix at all.
+        An entry whose nodes, components or values are no numbers, or that has no header; columns beyond NCOL; no
+        square matrix at all.
 
     Examples
     --------
@@ -108,11 +114,14 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     """
     found = _punched(content) or _line_by_line(content)
     square = [entries for entries in found if entries.form in SQUARE_FORMS and entries.rows.size]
+    others = [entries for entries in found if entries.form not in SQUARE_FORMS and entries.rows.size]
     doubts = ("has INCLUDE statements, which are not followed",) if _includes(content) else ()
     rounding = known_to(content)
     names: dict[bytes, tuple[str, ...]] = {}  # of matrices before, most of which have the same DOFs
-    matrices = [_assembled(entries, doubts, rounding, names) for entries in square]
-    if not matrices:
+    missing = _missing_dofs(square)
+    matrices = [_assembled(entries, (*doubts, *missing.get(id(entries), ())), rounding, names) for entries in square]
+    matrices += [_rectangular(entries, doubts, rounding) for entries in others]
+    if not square:
         what = ", ".join(dict.fromkeys([entries.name for entries in found])) or "none"
         msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
         raise FileFormatError(msg, path="")
@@ -136,7 +145,7 @@ def _line_by_line(content: bytes) -> list[_Entries]:
     """Read any layout, with the line that is wrong."""
     found: dict[str, _Entries] = {}
     earlier: list[_Entries] = []  #: of the same name
-    for fields, line in _bulk_entries(content, "DMIG"):
+    for fields, line, stray in _bulk_entries(content, "DMIG"):
         name = printable(fields[0].encode("latin-1")).lower()
         try:
             if fields[1].strip() == "0":
@@ -144,6 +153,7 @@ def _line_by_line(content: bytes) -> list[_Entries]:
                 found[name] = _opened(name, fields)
             else:
                 _add(found[name], fields)
+                found[name].stray = found[name].stray or stray
         except KeyError as cause:
             msg = f"a column of {name!r} before its header. The file is damaged."
             raise FileFormatError(msg, path="", line=line) from cause
@@ -174,7 +184,7 @@ def _extrn_by_line(content: bytes) -> tuple[list[int], list[int]]:
     """Read nodes and components of any layout, with the line that is wrong."""
     nodes: list[int] = []
     components: list[int] = []
-    for fields, line in _bulk_entries(content, "EXTRN"):
+    for fields, line, _ in _bulk_entries(content, "EXTRN"):
         texts = [text.strip() for text in fields]
         pairs = [pair for pair in zip(texts[::2], texts[1::2], strict=False) if pair != ("", "")]
         if not all(node.isdigit() and numbers.isdigit() for node, numbers in pairs):
@@ -190,13 +200,17 @@ def _extrn_by_line(content: bytes) -> tuple[list[int], list[int]]:
 
 
 def _opened(name: str, fields: list[str]) -> _Entries:
-    """Read a header: form, type of the input, and whether complex values are amplitude and phase."""
+    """Read a header: form, type of the input, whether complex values are amplitude and phase, and NCOL."""
     form, kind = int(fields[2]), int(fields[3])
-    polar = int(fields[5].strip() or 0) if len(fields) > POLAR_FIELD else 0
+    texts = [*fields, *[""] * COUNT_FIELD]
+    polar, count = (int(texts[place].strip() or 0) for place in (POLAR_FIELD, COUNT_FIELD))
     if form not in FORMS or kind not in TYPES:
         msg = f"form {form} and type {kind}, {NO_KIND}"
         raise ValueError(msg)
-    return _Entries(name, form, kind in COMPLEX_TYPES, polar > 0)
+    if count < 0:
+        msg = f"{count} columns, {NO_KIND}"
+        raise ValueError(msg)
+    return _Entries(name, form, kind in COMPLEX_TYPES, polar > 0, count)
 
 
 def _add(entries: _Entries, fields: list[str]) -> None:
@@ -240,31 +254,97 @@ def _assembled(
     entries: _Entries, doubts: tuple[str, ...], rounding: float, names: dict[bytes, tuple[str, ...]]
 ) -> RawMatrix:
     known = distinct(entries.rows, entries.columns)
-    values = entries.values
     declared: Declared = "symmetric" if entries.form == SYMMETRIC else "general"
-    nodes, components = known >> PUNCH_COMPONENT_BITS, known & (2**PUNCH_COMPONENT_BITS - 1)
     labels = known.tobytes()
     if labels not in names:
-        names[labels] = dof_names(nodes.tolist(), components.tolist())
+        names[labels] = _names(known)
     return assembled(
         np.searchsorted(known, entries.rows),
         np.searchsorted(known, entries.columns),
-        values if np.iscomplexobj(values) and values.imag.any() else values.real,
+        _real_if_real(entries.values),
         (known.size, known.size),
         declared=declared,
         format=f"Nastran DMIG, form {entries.form}",
         title=entries.name,
         named=True,
         dofs=names[labels],
-        doubts=doubts,
+        doubts=(*doubts, *_stray_doubt(entries)),
         known_to=rounding,
     )
 
 
-def _bulk_entries(content: bytes, keyword: str) -> Iterator[tuple[list[str], int]]:
-    """Return the data fields of each entry of a keyword, without continuation marks, and the line it starts at."""
+def _rectangular(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> RawMatrix:
+    """Make a matrix whose columns are numbered, or named by other DOFs than its rows."""
+    rows, columns = distinct(entries.rows), distinct(entries.columns)
+    numbers, count = columns >> PUNCH_COMPONENT_BITS, entries.n_columns
+    numbered = entries.form == RECTANGULAR and not (columns & (2**PUNCH_COMPONENT_BITS - 1)).any()
+    if numbered and not count:
+        doubts = (*doubts, "does not say how many columns it has (NCOL), so there may be more")
+    needed = int(numbers.max()) if numbered else columns.size
+    if needed > (count or most_rows(entries.columns.size)):
+        what = f"a column {needed}" if numbered else f"{needed} columns"
+        msg = f"{entries.name} has {what}, but its header says NCOL = {count}. The file is damaged."
+        raise FileFormatError(msg, path="")
+    places = (entries.columns >> PUNCH_COMPONENT_BITS) - 1 if numbered else np.searchsorted(columns, entries.columns)
+    width = max(needed, min(count, most_rows(entries.columns.size)))
+    return assembled(
+        np.searchsorted(rows, entries.rows),
+        places,
+        _real_if_real(entries.values),
+        (rows.size, width),
+        declared="general",
+        rectangular=True,
+        format=f"Nastran DMIG, form {entries.form}",
+        title=entries.name,
+        named=True,
+        dofs=_names(rows),
+        doubts=(*doubts, *_stray_doubt(entries)),
+        known_to=rounding,
+    )
+
+
+def _missing_dofs(square: Sequence[_Entries]) -> dict[int, tuple[str, ...]]:
+    """Compare the DOFs of the matrices of one set with their number, NCOL, which Nastran punches with each."""
+    found: dict[int, tuple[str, ...]] = {}
+    for count in {entries.n_columns for entries in square} - {0}:
+        group = [entries for entries in square if entries.n_columns == count]
+        known = {id(entries): distinct(entries.rows, entries.columns) for entries in group}
+        sizes = {key: dofs.size for key, dofs in known.items() if dofs.size > count}
+        every = distinct(*known.values()).size
+        if every < count:  # which may be null columns, but Nastran takes those out of the set
+            sizes = {id(group[0]): every}
+        for key, size in sizes.items():
+            more = "it may be cut short" if size < count else "something was added"
+            found[key] = (f"belongs to {count} DOFs by its header (NCOL), but there are entries for {size}: {more}",)
+    return found
+
+
+def _stray_doubt(entries: _Entries) -> tuple[str, ...]:
+    return (f"has another entry between its columns: {entries.stray}",) if entries.stray else ()
+
+
+def _real_if_real(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return values if np.iscomplexobj(values) and values.imag.any() else values.real
+
+
+def _names(keys: Keys) -> tuple[str, ...]:
+    nodes, components = keys >> PUNCH_COMPONENT_BITS, keys & (2**PUNCH_COMPONENT_BITS - 1)
+    return dof_names(nodes.tolist(), components.tolist())
+
+
+def _bulk_entries(content: bytes, keyword: str) -> Iterator[tuple[list[str], int, str]]:
+    """Return the data fields of each entry of a keyword, without continuation marks, and the line it starts at.
+
+    The last is another entry that stands between it and the one of that keyword before it, if there is one.
+
+    Raises
+    ------
+    FileFormatError
+        A line behind an entry of that keyword that neither goes on with it nor begins another one.
+    """
     fields: list[str] | None = None
     start = 0
+    stray, before = "", ""
     for number, whole in enumerate(content.split(b"\n"), start=1):
         line = whole.split(b"$", 1)[0].decode("latin-1").expandtabs(SMALL).rstrip()
         if not line:
@@ -275,10 +355,17 @@ def _bulk_entries(content: bytes, keyword: str) -> Iterator[tuple[list[str], int
                 fields += rest
             continue
         if fields is not None:
-            yield fields, start
-        fields, start = (rest, number) if first.rstrip("*").strip().upper() == keyword else (None, number)
+            if not first[0].isalpha():
+                msg = f"an entry goes on or another one begins here, not {line[:60]!r}. The file is damaged."
+                raise FileFormatError(msg, path="", line=number)
+            yield fields, start, before
+            stray = ""
+        if first.rstrip("*").strip().upper() == keyword:
+            fields, start, before = rest, number, stray
+        else:
+            fields, stray = None, stray or f"{line[:40].strip()!r} in line {number}"
     if fields is not None:
-        yield fields, start
+        yield fields, start, before
 
 
 def _cut(line: str) -> tuple[str, list[str]]:

@@ -98,6 +98,8 @@ def _matrices(lines: CutLines, first: Characters) -> list[PunchedMatrix] | None:
     found = []
     for begin, stop in zip(headers, [*headers[1:].tolist(), heads.size], strict=True):
         own = np.flatnonzero(is_column[begin:stop]) + begin
+        if own.size and own.size < own[-1] - begin:  # other entries between the columns
+            return None
         titles = np.char.strip(np.unique(texts_of(names[own, LEAD:])))
         if (titles != names[begin, LEAD:FIELD].tobytes().strip()).any():
             return None

@@ -30,6 +30,7 @@ from halfdof_ctrl.files.formats.variables import (
     Variable,
     another_kind,
     most_unpacked,
+    require_ascending,
     require_room,
 )
 
@@ -328,9 +329,8 @@ def _sparse(head: _Head, body: _Bytes) -> csc_array:
     if not (sound and row.size == values.size == stored and ((row >= 0) & (row < rows)).all()):
         msg = f"the sparse matrix {head.name} has indices out of bounds"
         raise ValueError(msg)
-    matrix = csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=(rows, columns))
-    matrix.sum_duplicates()
-    return matrix
+    require_ascending(head.name, row, start)
+    return csc_array((values.astype(np.result_type(values.dtype, np.float64)), row, start), shape=(rows, columns))
 
 
 def _require_readable(head: _Head, entries: int) -> None:

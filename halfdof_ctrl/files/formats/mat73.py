@@ -29,6 +29,7 @@ from halfdof_ctrl.files.formats.variables import (
     another_kind,
     most_unpacked,
     out_of_room,
+    require_ascending,
 )
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -224,9 +225,8 @@ def _sparse(item: Any, name: str, length: int) -> csc_array:  # noqa: ANN401
     if not (sound and 0 <= rows <= max(MOST_ROWS, length) and ((row >= 0) & (row < rows)).all()):
         msg = f"the sparse matrix {name} has indices out of bounds. The file is damaged."
         raise FileFormatError(msg, path="")
-    matrix = csc_array((values, row, start), shape=(rows, lengths.size))
-    matrix.sum_duplicates()
-    return matrix
+    require_ascending(name, row, start)
+    return csc_array((values, row, start), shape=(rows, lengths.size))
 
 
 def _numbers(data: npt.NDArray[Any], name: str) -> npt.NDArray[Any]:

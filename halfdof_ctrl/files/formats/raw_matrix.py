@@ -22,6 +22,10 @@ IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 
 MOST_ROWS = 20_000_000  #: index arrays of 160 MB; a header that says more than this and the file's length is damaged
 FREE_ROWS = 10_000  #: rows that a file may say it has, whatever its length
+TWICE = (
+    "has {} entries at places that have one already, and they are added up: these are matrices of elements that nobody "
+    "assembled, or lines that stand twice"
+)
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
 
 
@@ -42,6 +46,8 @@ class RawMatrix:
     open_size: bool = False  #: whether there may be more rows, without entries, than the file tells
     first_index: int = 1  #: from which number on the file counts rows, where it does not say so
     known_to: float = EPS  #: relative rounding of the entries by the file's digits
+    rectangular: bool = False  #: whether its columns are no DOFs, whatever their number
+    places: IndexArray | None = None  #: row times n plus column of all entries, where a run writes the same for each
     notes: tuple[str, ...] = ()  #: anything else that a user should know
     doubts: tuple[str, ...] = ()  #: what may be wrong with the file
 
@@ -72,6 +78,11 @@ def assembled(
     declared : {"symmetric", "skew-symmetric", "general", "unsymmetric", "unsaid"}
         The first two let the other entry of each pair be filled in.
 
+    Returns
+    -------
+    RawMatrix
+        With a doubt where entries stand more than once: assembled matrices have none, but lines may have been doubled.
+
     Raises
     ------
     FileFormatError
@@ -95,13 +106,11 @@ def assembled(
         msg = f"an entry lies outside the {shape[0]} x {shape[1]} matrix. The file is damaged."
         raise FileFormatError(msg, path="")
     matrix = csc_array(coo_array((values, (rows, columns)), shape=shape))  # duplicates are added up
-    notes = words.pop("notes", ())
+    doubts = tuple(words.pop("doubts", ()))
     if matrix.nnz < rows.size:
-        notes = (*notes, f"{rows.size - matrix.nnz} entries stand more than once and are added up")
+        doubts = (*doubts, TWICE.format(rows.size - matrix.nnz))
     matrix.eliminate_zeros()
-    raw = RawMatrix(
-        matrix=matrix, declared=declared, stored=storage(matrix), completed=False, notes=tuple(notes), **words
-    )
+    raw = RawMatrix(matrix=matrix, declared=declared, stored=storage(matrix), completed=False, doubts=doubts, **words)
     return completed(raw) if declared in {"symmetric", "skew-symmetric"} and raw.stored != "diagonal" else raw
 
 

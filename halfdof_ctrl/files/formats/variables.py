@@ -5,11 +5,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
+import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.errors import FileFormatError
 
+IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
 Kind: TypeAlias = Literal["matrix", "text", "struct", "cell", "object"]
 
@@ -81,6 +83,24 @@ def out_of_room(name: str, size: int, length: int) -> FileFormatError:
         "zeros mostly, save it sparse."
     )
     return FileFormatError(msg, path="")
+
+
+def require_ascending(name: str, rows: IndexArray, starts: IndexArray) -> None:
+    """Refuse compressed columns of MATLAB whose row numbers do not ascend, each once, as its own always do.
+
+    Raises
+    ------
+    FileFormatError
+        A row number is damaged, or a column begins elsewhere.
+    """
+    ascends = np.ones(rows.size + 1, dtype=bool)
+    ascends[1:-1] = np.diff(rows) > 0
+    ascends[starts[:-1]] = True
+    if not ascends.all():
+        place = int(np.argmin(ascends))
+        column = int(np.searchsorted(starts, place, side="right"))
+        msg = f"the rows in column {column} of the sparse matrix {name} do not ascend. The file is damaged."
+        raise FileFormatError(msg, path="")
 
 
 def another_kind(name: str) -> FileFormatError:

@@ -12,7 +12,7 @@ from halfdof_ctrl.files.formats.calculix import read_calculix, read_dofs
 
 K = np.array([[4.0, -1.0, 0.0], [-1.0, 3.0, -0.5], [0.0, -0.5, 2.0]])
 STI = b"1 1  4.0e+00\n1 2 -1.0e+00\n2 2  3.0e+00\n1 3  0.0e+00\n2 3 -5.0e-01\n3 3  2.0e+00\n"
-MAS = b"1 1  1.0e+00\n2 2  1.0e+00\n3 3  0.0e+00\n"  # the last DOF has no mass, and its line
+MAS = b"1 1  1.0e+00\n1 2  0.0e+00\n2 2  1.0e+00\n1 3  0.0e+00\n2 3  0.0e+00\n3 3  0.0e+00\n"  # zeros have lines too
 DOF = b"5.1\n5.3\n60.2\n"
 BEAM = Path(__file__).parents[2] / "data" / "calculix" / "beam.sti"  # of beam.inp, as CalculiX 2.20 writes it
 
@@ -29,7 +29,7 @@ def test_the_three_files_are_one_model(tmp_path: Path, given: str) -> None:
     np.testing.assert_array_equal(model.M.toarray(), np.diag([1.0, 1.0, 0.0]))
 
 
-@pytest.mark.parametrize(("name", "lines"), [("job.mas", 2), ("job.sti", 3)])
+@pytest.mark.parametrize(("name", "lines"), [("job.mas", 3), ("job.sti", 3)])
 def test_a_file_that_ends_before_the_last_row_was_cut(tmp_path: Path, name: str, lines: int) -> None:
     """CalculiX writes the zeros of each row too, so that every row that the .dof file names has its lines."""
     files = {"job.sti": STI, "job.mas": MAS, "job.dof": DOF}
@@ -44,6 +44,17 @@ def test_a_row_without_a_line_was_lost() -> None:
     """Somewhere in the middle, as where a part of a file is missing."""
     with pytest.raises(FileFormatError, match="row 2 has no line on its diagonal"):
         read_calculix(STI.replace(b"2 2  3.0e+00\n", b""), ".sti", 99)
+
+
+@pytest.mark.parametrize("name", ["job.sti", "job.mas"])
+def test_a_line_that_only_one_of_the_files_has_is_told(tmp_path: Path, name: str) -> None:
+    """Off the diagonal: zeros are written, so that both files have lines for the same places."""
+    files = {"job.sti": STI, "job.mas": MAS, "job.dof": DOF}
+    files[name] = b"".join([line for line in files[name].splitlines(keepends=True) if not line.startswith(b"2 3")])
+    for each, content in files.items():
+        (tmp_path / each).write_bytes(content)
+    with pytest.warns(ImportedModelWarning, match="1 are in one of them alone, the first in row 2 and column 3"):
+        load_model({"K": tmp_path / "job.sti", "M": tmp_path / "job.mas"})
 
 
 def test_a_beam_has_the_frequencies_that_calculix_found() -> None:

@@ -144,3 +144,12 @@ def test_a_packed_variable_must_be_as_long_as_it_says() -> None:
     packed = zlib.compress(longer)
     with pytest.raises(ValueError, match="not as long as it says"):
         read_mat(whole[:128] + struct.pack("<II", 15, len(packed)) + packed, ["K"])
+
+
+@pytest.mark.parametrize(("rows", "starts", "column"), [([1, 0, 2], [0, 2, 3], 1), ([0, 1, 1], [0, 1, 3], 2)])
+def test_rows_that_do_not_ascend_are_refused(rows: list[int], starts: list[int], column: int) -> None:
+    """MATLAB's always do: a row number that was changed would move an entry, or add it to another one."""
+    parts = [element(5, np.array(part, dtype="<i4").tobytes()) for part in (rows, starts)]
+    numbers = element(9, np.array([1.0, 2.0, 3.0]).tobytes())
+    with pytest.raises(HalfdofError, match=f"rows in column {column} of the sparse matrix K do not ascend"):
+        read_mat(variable(5, (3, 2), [*parts, numbers]), ["K"])

@@ -81,7 +81,7 @@ def test_entries_that_stand_twice_are_added_up_and_told() -> None:
         np.array([0, 0]), np.array([0, 0]), np.array([1.0, 2.0]), (1, 1), declared="unsaid", format="test"
     )
     assert found.matrix.toarray().tolist() == [[3.0]]
-    assert found.notes == ("1 entries stand more than once and are added up",)
+    assert found.doubts[0].startswith("has 1 entries at places that have one already, and they are added up")
 
 
 def test_zeros_that_are_stored_are_no_entries() -> None:
