@@ -6,6 +6,7 @@ A ``.npy`` file holds one array, which has no name.
 """
 
 import os
+import unicodedata
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -19,7 +20,7 @@ from halfdof_ctrl.files.formats.mat4 import is_mat4, mat4_variables
 from halfdof_ctrl.files.formats.mat5 import mat5_variables
 from halfdof_ctrl.files.formats.mat73 import is_mat73, mat73_variables
 from halfdof_ctrl.files.formats.npy import SPARSE_PARTS, is_npy, npy_variable, npz_variables
-from halfdof_ctrl.files.formats.variables import Variable
+from halfdof_ctrl.files.formats.variables import Variable, require_names_once
 from halfdof_ctrl.files.naming import naming_the_file
 
 PathLike: TypeAlias = str | os.PathLike[str]
@@ -65,7 +66,9 @@ def variables(content: bytes, *, is_archive: bool) -> list[Variable]:
         return npz_variables(content)
     if is_mat73(content):
         return mat73_variables(content)
-    return mat4_variables(content) if is_mat4(content) else mat5_variables(content)
+    found = mat4_variables(content) if is_mat4(content) else mat5_variables(content)
+    require_names_once(found)
+    return found
 
 
 def texts(content: Content, key: str) -> list[str] | None:
@@ -87,7 +90,19 @@ def single_text(content: Content) -> str | None:
     if len(found) > 1:
         msg = f"name must be one text, but it has {len(found)}."
         raise FileFormatError(msg, path="")
+    if has_controls(found[0]):
+        msg = "name has control characters, which no name has. Write the file anew, with another name."
+        raise FileFormatError(msg, path="")
     return found[0] or None
+
+
+def has_controls(text: str) -> bool:
+    r"""Tell whether a text holds control characters or halves of characters, which files and terminals do not keep.
+
+    >>> has_controls("mount 3\xa0kg"), has_controls("a\x1b[2J"), has_controls("a\ud800")
+    (False, True, True)
+    """
+    return any(unicodedata.category(letter) in {"Cc", "Cs"} for letter in text)
 
 
 def sparse_parts(key: str, matrix: Any) -> dict[str, Any]:  # noqa: ANN401  # any sparse format

@@ -183,7 +183,7 @@ class _Reading:
         if is_matlab and (content.startswith(OCTAVE) or table.is_table(content)):  # save -ascii, and Octave's own
             return _read(path, content, self.room, is_signal=is_signal)
         if is_npy(content) or is_npz(content) or path.suffix.lower() in MATRIX_ENDINGS:
-            return read_workspace(content, self.titles, is_archive=not is_matlab)
+            return read_workspace(content, self.titles, self.room, is_archive=not is_matlab)
         return _read(path, content, self.room, is_signal=is_signal)
 
     def result(self) -> Sources:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, cast
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import csc_array, issparse
 
 from halfdof_ctrl.base.arrays import EPS, checked_matrix
@@ -20,11 +21,19 @@ from halfdof_ctrl.base.errors import FileFormatError, HalfdofError, MatrixError
 from halfdof_ctrl.base.names import checked_dofs, listed
 from halfdof_ctrl.files.containers import texts, variables
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, storage
-from halfdof_ctrl.files.formats.variables import PLANE, Variable, another_kind
+from halfdof_ctrl.files.formats.variables import (
+    EXPANSION,
+    PLANE,
+    Variable,
+    another_kind,
+    most_unpacked,
+    out_of_room,
+)
 
 SQUARE = ("M", "C", "K", "S")
 SIGNALS = ("B", "Bv", "Ba", "F", "G", "H", "D", "Dv", "Da")
 TEXT_VARIABLES = ("dofs", "inputs", "outputs", "prescribed", "elements")
+BYTES_OF_ENTRY = 36  #: of a full matrix: the number as float64, and in compressed columns while these are made
 ROUNDING_VARIABLE = "known_to"  #: variable with the relative rounding of the entries
 STATE_SPACE = {"A", "B", "C", "D"}
 SAVED_TEXTS = ("elements",)  #: which save_model writes as text; a workspace may have a table of that name
@@ -46,7 +55,7 @@ class Workspace:
     own_layout: bool  #: whether the file has all that save_model writes
 
 
-def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archive: bool) -> Workspace:
+def read_workspace(content: bytes, titles: Mapping[str, str | None], room: int, *, is_archive: bool) -> Workspace:
     """Read what belongs to a model.
 
     Parameters
@@ -55,6 +64,8 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         The whole file.
     titles : mapping from letter to str or None
         Names that the user gives; None: there is no such matrix.
+    room : int
+        A variable with more rows, columns or names is taken for damage.
     is_archive : bool
         Whether it is of NumPy.
 
@@ -92,9 +103,11 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         for key in (*TEXT_VARIABLES, "name")
         if key in named and (own_layout or _names_signals(key, named[key], size))
     ]
+    for variable in (*chosen.values(), *[named[key] for key in called]):
+        _require_room(variable, room)
     names = {key: named[key].read() for key in called}
     dofs = texts(names, "dofs")
-    rounding = _rounding(named)
+    rounding = _rounding(named, own_layout=own_layout)
     taken = [id(variable) for variable in chosen.values()]
     return Workspace(
         matrices=tuple(
@@ -104,6 +117,22 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], *, is_archi
         texts=names,
         own_layout=own_layout,
     )
+
+
+def _require_room(variable: Variable, room: int) -> None:
+    """Refuse what has more rows, columns or names than its file has bytes, before memory is taken for them."""
+    if max(variable.shape, default=0) > room:
+        size = " x ".join(map(str, variable.shape))
+        msg = f"{variable.name or 'it'} is {size}, more than its file has bytes for. The file is damaged."
+        raise FileFormatError(msg, path="")
+
+
+def _require_spread(array: npt.NDArray[Any], name: str) -> None:
+    """Refuse a full matrix of numbers of one or two bytes, which as float64 is out of proportion to its file."""
+    if array.dtype.itemsize * EXPANSION <= BYTES_OF_ENTRY and array.dtype.kind in "biuf":
+        spread = int(np.count_nonzero(array)) * BYTES_OF_ENTRY
+        if spread > most_unpacked(array.nbytes):
+            raise out_of_room(name, spread, array.nbytes)
 
 
 def _names_signals(key: str, variable: Variable, size: int) -> bool:
@@ -206,9 +235,12 @@ def _proposal(found: Sequence[Variable]) -> str:
     return ", ".join(words) or "'K': name, 'M': name, 'C': name"
 
 
-def _rounding(named: Mapping[str, Variable]) -> float:
+def _rounding(named: Mapping[str, Variable], *, own_layout: bool) -> float:
     variable = named.get(ROUNDING_VARIABLE)
     value = float(np.asarray(variable.read()).item()) if variable is not None and variable.kind == "matrix" else EPS
+    if own_layout and not EPS <= value < 1.0:
+        msg = f"{ROUNDING_VARIABLE} is {value:g}, which is no relative rounding of entries. The file is damaged."
+        raise FileFormatError(msg, path="")
     return value if EPS <= value < 1.0 else EPS
 
 
@@ -256,5 +288,6 @@ def _as_matrix(letter: str | None, name: str, value: Any) -> tuple[csc_array, An
             f"name the right one, matrices={{{letter!r}: name}}, or leave it out, matrices={{{letter!r}: None}}."
         )
         raise MatrixError(msg, matrix=shown)
+    _require_spread(array, shown)
     checked = checked_matrix(array, shown, None if letter in SQUARE[:3] else array.shape if array.ndim > 1 else None)
     return csc_array(checked), array

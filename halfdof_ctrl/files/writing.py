@@ -11,7 +11,7 @@ import scipy.io
 from scipy.sparse import issparse
 
 from halfdof_ctrl.base.errors import FileFormatError
-from halfdof_ctrl.files.containers import MATRIX_ENDINGS, Content, PathLike, ending, sparse_parts
+from halfdof_ctrl.files.containers import MATRIX_ENDINGS, Content, PathLike, ending, has_controls, sparse_parts
 
 
 @contextmanager
@@ -59,7 +59,7 @@ def save_matrices(path: PathLike, content: Content, names: Mapping[str, Sequence
     """Write matrices and names of signals as `.npz` or `.mat`."""
     suffix = ending(path, MATRIX_ENDINGS)
     for text in (*(text for group in names.values() for text in group), name or ""):
-        if any(ord(letter) < ord(" ") or "\ud800" <= letter <= "\udfff" for letter in text):
+        if has_controls(text):
             msg = f"{path}: the name {text!r} holds a control character, which files do not keep. Rename the signal."
             raise FileFormatError(msg, path=str(path))
     with replacing(path) as stream:

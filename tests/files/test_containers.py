@@ -9,7 +9,7 @@ import pytest
 import scipy.io
 from scipy.sparse import coo_array, csc_array
 
-from halfdof_ctrl import inspect_files, load_model, save_model
+from halfdof_ctrl import inspect_files, load_model, load_system, save_model
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.containers import load_variables, sparse_parts
 from halfdof_ctrl.model.mechss import mechss
@@ -103,3 +103,12 @@ def test_a_sparse_model_is_saved_by_its_parts(tmp_path: Path) -> None:
     save_model(replace(model, K=sparse), tmp_path / "a.npz")
     found = load_variables(tmp_path / "a.npz", ["K"])["K"]
     np.testing.assert_array_equal(found.toarray(), K)
+
+
+def test_a_name_that_a_terminal_obeys_is_refused(tmp_path: Path) -> None:
+    """Neither of a model nor of a state space."""
+    np.savez(tmp_path / "a.npz", K=np.eye(2), M=np.eye(2), C=np.eye(2), name=np.array("a\x1b[2J"))
+    np.savez(tmp_path / "s.npz", A=np.eye(1), B=np.eye(1), C=np.eye(1), D=np.eye(1), name=np.array("a\nb"))
+    for door, file in ((load_model, "a.npz"), (load_system, "s.npz")):
+        with pytest.raises(FileFormatError, match="name has control characters"):
+            door(tmp_path / file)

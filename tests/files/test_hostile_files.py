@@ -1,9 +1,11 @@
 """Claims about files that lie: no crash, no foreign file, no allocation out of proportion, no global state touched."""
 
 import io
+import struct
 import threading
 import tracemalloc
 import warnings
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -188,3 +190,66 @@ def test_loading_in_threads_leaves_the_filters_of_warnings_alone(tmp_path: Path)
         for thread in threads:
             thread.join()
         assert list(warnings.filters) == before
+
+
+def member(header: str, data: bytes) -> bytes:
+    """Write an array with any header."""
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header.encode() + data
+
+
+def archive(members: dict[str, bytes], kind: int = zipfile.ZIP_DEFLATED, *more: tuple[str, bytes]) -> bytes:
+    """Write an archive of any members."""
+    stream = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(stream, "w", kind) as file:
+        warnings.simplefilter("ignore")  # of a name that stands there
+        for name, content in (*members.items(), *more):
+            file.writestr(name, content)
+    return stream.getvalue()
+
+
+ONES = member("{'descr': '|i1', 'fortran_order': False, 'shape': (3000, 3000), }", b"\1" * 3000**2)
+LONG = member("{'descr': '<f8', 'fortran_order': False, 'shape': (" + "9" * 99 + ",), }", b"")
+FEW = scipy.sparse.csc_array(([1.0], ([0], [0])), shape=(1_000_000, 1_000_000))
+EMPTY = b"    9999    9999       6       2KAA     1P,3E23.16\n   10000       1       1\n 1.0000000000000000E+00\n"
+WIDE = struct.pack("<5i", 2, 2, 3, 0, 2) + b"K\0" + np.array([1.0, 2e7, 1.0, 2e7, 1.0, 0.0]).tobytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.npz", archive({"K.npy": npy()}, zipfile.ZIP_DEFLATED, ("K.npy", npy())), "two variables 'K'"),
+        ("a.npz", archive({"K.npy": npy(), "K": npy()}), "two variables 'K'"),
+        ("a.npz", archive({"K.npy": ONES}, zipfile.ZIP_BZIP2), "packed as numpy.savez_compressed packs nothing"),
+        ("a.npz", archive({"K.npy": ONES}, zipfile.ZIP_LZMA), "packed as numpy.savez_compressed packs nothing"),
+        ("a.npz", archive({"K.npy": ONES}), "more than are unpacked"),
+        ("a.npz", archive({"K.npy": LONG}), "a size of 99 digits"),
+        ("a.mat", workspace("5", K=FEW), "K is 1000000 x 1000000, more than its file has bytes for"),
+        ("4.mat", WIDE, "K is 20000000 x 20000000, more than its file has bytes for"),
+        ("a.op4", EMPTY * 2000, "columns in all in a file of"),
+        ("k.mtx", b"*INCLUDE, INPUT=/etc/passwd\n1,1, 1,1, 6.0\n", "none of .INCLUDE"),
+        ("4.mat", workspace("4", K=K) * 2, "two variables 'K'"),
+        ("5.mat", workspace("5", K=K) + workspace("5", K=K)[128:], "two variables 'K'"),
+        ("5.mat", workspace("5", **{f"v{number}": 1.0 for number in range(4001)}), "more than 4000 variables"),
+    ],
+    ids=range(13),
+)  # fmt: skip
+def test_a_file_that_holds_more_than_it_seems_is_refused(
+    tmp_path: Path, name: str, content: bytes, message: str
+) -> None:
+    """Before it takes memory, and whatever comes first of what contradicts itself."""
+    (tmp_path / name).write_bytes(content)
+    tracemalloc.start()
+    try:
+        with pytest.raises(FileFormatError, match=message):
+            load_model(tmp_path / name)
+        assert tracemalloc.get_traced_memory()[1] < max(10 * len(content), 2**22)
+    finally:
+        tracemalloc.stop()
+
+
+def test_names_of_variables_do_not_move_the_cursor(tmp_path: Path) -> None:
+    """A terminal would obey them."""
+    (tmp_path / "a.npz").write_bytes(archive({"\x1b[31mK.npy": npy(), "L.npy": npy()}))
+    with pytest.raises(FileFormatError, match=r"it holds \?\[31mK, L") as refusal:
+        load_model(tmp_path / "a.npz")
+    assert "\x1b" not in str(refusal.value)

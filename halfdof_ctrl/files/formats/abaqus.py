@@ -34,7 +34,7 @@ LABELLED, UNLABELLED = 5, 3  #: numbers in a line
 MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
 MATRIX_INPUT = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
 SCALE = re.compile(rb"^\*\s*matrix[^\n]*\bscale\s+factor\s*=\s*([^\s,]+)", re.IGNORECASE | re.MULTILINE)
-ELSEWHERE = re.compile(rb"^\*\s*matrix[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
+ELSEWHERE = re.compile(rb"^\*\s*(?:matrix|include)[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
 LOAD = re.compile(rb"^\*\s*cload", re.IGNORECASE | re.MULTILINE)
 LARGEST_LABEL = 2**31 - 1
 INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
@@ -46,7 +46,7 @@ def data_columns(content: bytes) -> int:
     for line in content[:65536].split(b"\n"):
         if line.strip() and not line.startswith(b"*"):
             fields = line.replace(b",", b" ").split()
-            numbers = all(re.fullmatch(rb"[-+]?[0-9.]+([DEde]?[-+]?[0-9]+)?", field) for field in fields)
+            numbers = all(re.fullmatch(rb"[-+]?[0-9.]+([DEde][-+]?[0-9]+|[-+][0-9]+)?", field) for field in fields)
             return len(fields) if numbers and len(fields) in {LABELLED, UNLABELLED} else 0
     return 0
 
@@ -76,8 +76,8 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     has_keywords = b"*" in content
     if has_keywords and (ELSEWHERE.search(content) or len(MATRIX_INPUT.findall(content)) > 1):
         msg = (
-            "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read. Give the "
-            "file with the numbers, or write each matrix into its own."
+            "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read (and none "
+            "of *INCLUDE). Give the file with the numbers, or write each matrix into its own."
         )
         raise FileFormatError(msg, path="")
     if not columns:

@@ -18,7 +18,7 @@ from halfdof_ctrl.files.formats.columns import cut_lines, whole_fields
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
+from halfdof_ctrl.files.formats.text_blocks import FIELD, number_rows, whole_numbers
 
 KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
@@ -96,14 +96,23 @@ def read_dofs(content: bytes) -> tuple[str, ...]:
 
 def _dofs_by_line(content: bytes) -> tuple[str, ...]:
     """Read the names one by one, with the line that is wrong."""
-    lines = content.split()
-    found = [LABEL.fullmatch(line) for line in lines]
-    wrong = next((number for number, match in enumerate(found, start=1) if match is None), 0)
-    if wrong or not lines:
-        shown = lines[wrong - 1][:60].decode("latin-1") if lines else ""
-        msg = f"a node and its DOF belong into each line, as 5.1, not {shown!r}. The file is damaged."
-        raise FileFormatError(msg, path="", line=wrong or 1)
-    return dof_names([int(match[1]) for match in found if match], [int(match[2]) for match in found if match])
+    nodes: list[int] = []
+    components: list[int] = []
+    for line in FIELD.finditer(content):
+        match = LABEL.fullmatch(line[0])
+        if match is None:
+            raise _no_label(line[0], len(nodes) + 1)
+        nodes.append(int(match[1]))
+        components.append(int(match[2]))
+    if not nodes:
+        raise _no_label(b"", 1)
+    return dof_names(nodes, components)
+
+
+def _no_label(text: bytes, line: int) -> FileFormatError:
+    shown = text[:60].decode("latin-1")
+    msg = f"a node and its DOF belong into each line, as 5.1, not {shown!r}. The file is damaged."
+    return FileFormatError(msg, path="", line=line)
 
 
 def _plain_dofs(content: bytes) -> tuple[str, ...] | None:

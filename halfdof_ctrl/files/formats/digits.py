@@ -10,7 +10,7 @@ import re
 from halfdof_ctrl.base.arrays import EPS
 
 SAMPLE = 2**16  #: bytes at the start and at the end that are looked at; a file has one format
-NUMBER = re.compile(rb"(\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(\d+)[EeDdQq][+-]?\d+")
+NUMBER = re.compile(rb"((?<!\d)\d+\.\d*|\.\d+)(?:[EeDdQq][+-]?\d+|[+-]\d{2,3})?|(?<!\d)(\d+)[EeDdQq][+-]?\d+")
 FULL_DIGITS = 16  #: digits from which numbers are as good as float64
 DIGITS_SURE = 6  #: digits from which few numbers of full length tell a format
 DIGITS_FEW, SHARE = 2, 0.2  #: numbers of full length, and their share, that it takes then

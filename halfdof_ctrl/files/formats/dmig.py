@@ -120,7 +120,8 @@ def read_dmig(content: bytes) -> list[RawMatrix]:
     names: dict[bytes, tuple[str, ...]] = {}  # of matrices before, most of which have the same DOFs
     missing = _missing_dofs(square)
     matrices = [_assembled(entries, (*doubts, *missing.get(id(entries), ())), rounding, names) for entries in square]
-    matrices += [_rectangular(entries, doubts, rounding) for entries in others]
+    room = most_rows(len(content))
+    matrices += [_rectangular(entries, doubts, rounding, room) for entries in others]
     if not square:
         what = ", ".join(dict.fromkeys([entries.name for entries in found])) or "none"
         msg = f"no square DMIG matrix in it (found: {what}). Write it by EXTSEOUT(STIFFNESS,MASS,DAMPING,DMIGPCH)."
@@ -273,7 +274,7 @@ def _assembled(
     )
 
 
-def _rectangular(entries: _Entries, doubts: tuple[str, ...], rounding: float) -> RawMatrix:
+def _rectangular(entries: _Entries, doubts: tuple[str, ...], rounding: float, room: int) -> RawMatrix:
     """Make a matrix whose columns are numbered, or named by other DOFs than its rows."""
     rows, columns = distinct(entries.rows), distinct(entries.columns)
     numbers, count = columns >> PUNCH_COMPONENT_BITS, entries.n_columns
@@ -281,17 +282,16 @@ def _rectangular(entries: _Entries, doubts: tuple[str, ...], rounding: float) ->
     if numbered and not count:
         doubts = (*doubts, "does not say how many columns it has (NCOL), so there may be more")
     needed = int(numbers.max()) if numbered else columns.size
-    if needed > (count or most_rows(entries.columns.size)):
+    if needed > (count or room) or count > room:
         what = f"a column {needed}" if numbered else f"{needed} columns"
         msg = f"{entries.name} has {what}, but its header says NCOL = {count}. The file is damaged."
         raise FileFormatError(msg, path="")
     places = (entries.columns >> PUNCH_COMPONENT_BITS) - 1 if numbered else np.searchsorted(columns, entries.columns)
-    width = max(needed, min(count, most_rows(entries.columns.size)))
     return assembled(
         np.searchsorted(rows, entries.rows),
         places,
         _real_if_real(entries.values),
-        (rows.size, width),
+        (rows.size, max(needed, count)),
         declared="general",
         rectangular=True,
         format=f"Nastran DMIG, form {entries.form}",

@@ -19,7 +19,7 @@ from scipy.sparse import coo_array, csc_array
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import Value, Variable
+from halfdof_ctrl.files.formats.variables import Value, Variable, require_few
 
 MAT4_HEADER = 20  #: bytes of the five integers
 PRECISIONS = ("f8", "f4", "i4", "i2", "u2", "u1")
@@ -75,6 +75,7 @@ def mat4_variables(content: bytes) -> list[Variable]:
                 read=partial(_read, content, header),
             )
         )
+        require_few(len(found))
         place = header.stop
     return found
 
@@ -106,7 +107,7 @@ def _shape(content: bytes, header: _Header) -> tuple[int, ...]:
     if header.kind != MAT4_SPARSE or header.shape[0] < 1 or header.shape[1] < TRIPLET_COLUMNS:
         return header.shape
     last = _table(content, header)[0][-1, :2]
-    return tuple(np.nan_to_num(last).astype(np.int64).tolist()) if np.abs(last).max() < MOST_ROWS else header.shape
+    return tuple(np.nan_to_num(last).astype(np.int64).tolist()) if np.abs(last).max() <= MOST_ROWS else header.shape
 
 
 def _table(content: bytes, header: _Header) -> tuple[npt.NDArray[Any], npt.NDArray[Any] | None]:
@@ -121,7 +122,8 @@ def _table(content: bytes, header: _Header) -> tuple[npt.NDArray[Any], npt.NDArr
 def _read(content: bytes, header: _Header) -> Value:
     real, imaginary = _table(content, header)
     if header.kind == TEXT:
-        return ["".join([chr(int(unit)) for unit in row]).rstrip(" ") for row in real.tolist()]
+        rows = ["".join([chr(int(unit)) for unit in row]) for row in real.tolist()]
+        return [row.encode("utf-16-le", "surrogatepass").decode("utf-16-le").rstrip(" ") for row in rows]
     if header.kind == MAT4_SPARSE:
         return _sparse(header.name, real)
     return real if imaginary is None else real + 1j * imaginary
@@ -144,4 +146,8 @@ def _sparse(name: str, table: npt.NDArray[Any]) -> csc_array:
     values = table[:-1, 2] + 1j * table[:-1, 3] if columns > TRIPLET_COLUMNS else table[:-1, 2]
     shape = (int(last[0]), int(last[1]))
     i, j = places.astype(np.int64).T
-    return csc_array(coo_array((values, (i, j)), shape=shape))
+    matrix = csc_array(coo_array((values, (i, j)), shape=shape))
+    if matrix.nnz < i.size:
+        msg = f"the sparse matrix {name} has two entries at one place. The file is damaged."
+        raise FileFormatError(msg, path="")
+    return matrix

@@ -31,6 +31,7 @@ from halfdof_ctrl.files.formats.variables import (
     another_kind,
     most_unpacked,
     require_ascending,
+    require_few,
     require_room,
 )
 
@@ -87,6 +88,7 @@ def _packed_variables(content: bytes, order: str) -> list[tuple[int, bytes]]:
     found = []
     while elements:
         found.append(elements.element())
+        require_few(len(found))
     return found
 
 
@@ -365,7 +367,11 @@ def _rows(head: _Head, body: _Bytes) -> list[str]:
         ending = {"<": "-le", ">": "-be"}[body.order] if kind in (17, 18) else ""
         text = data.decode(TEXT_ENCODINGS[kind] + ending)
     else:
-        text = body.as_numbers(kind, data).astype("<u2").tobytes().decode("utf-16-le")
+        units = body.as_numbers(kind, data)
+        if units.dtype.kind == "f":
+            msg = f"text of fractions in {head.name}"
+            raise ValueError(msg)
+        text = units.astype("<u2").tobytes().decode("utf-16-le")
     letters = np.array(list(text), dtype=np.str_) if len(text) == _count(head.shape) else _units(text)
     return [
         "".join(row).encode("utf-16-le", "surrogatepass").decode("utf-16-le").rstrip(" ")

@@ -38,6 +38,14 @@ HDF5_EXTRA = "hdf5"
 MOST_DEPTH = 4  #: structs in structs that are looked into
 OWN = "#"  #: begins the names of groups that MATLAB keeps for itself
 REAL_KINDS = "biuf"
+NUMERIC_CLASSES = tuple(
+    [
+        name.encode()
+        for name in ("double", "single", "logical", *[f"{u}int{n}" for u in ("", "u") for n in (8, 16, 32, 64)])
+    ]
+)  #: of MATLAB; Octave and others write no class
+MOST_READ_AGAIN = 2**33  #: bytes that are unpacked where the same pieces are unpacked several times
+FREE_CHUNKS, CHUNK_ENTRY = 10_000, 16  #: pieces of a dataset in any file, and bytes that tell where each of more lies
 
 
 def is_mat73(content: bytes) -> bool:
@@ -124,6 +132,8 @@ def _described(content: bytes, file: Any, item: Any, names: tuple[str, str], roo
         kind, parts = "cell", _cells(content, file, item, name, room)
     elif _is_char(item):
         kind = "text"
+    elif item.attrs.get("MATLAB_class", NUMERIC_CLASSES[0]) not in NUMERIC_CLASSES:
+        kind = "object"
     elif item.dtype.kind in REAL_KINDS or item.dtype.names == ("real", "imag"):
         kind, shape = "matrix", tuple(reversed(item.shape or ()))
     return Variable(
@@ -168,6 +178,16 @@ def _h5py() -> Any:  # noqa: ANN401  # a module that need not be there
         raise MissingExtraError(msg, path="", extra=HDF5_EXTRA) from cause
 
 
+def _require_few_chunks(item: Any, name: str, length: int) -> None:  # noqa: ANN401
+    """Refuse a dataset in more pieces than the file can hold, each of which takes time though it holds nothing."""
+    if not item.chunks:
+        return
+    chunks = math.prod([-(-size // chunk) for size, chunk in zip(item.shape, item.chunks, strict=True)])
+    if chunks > max(FREE_CHUNKS, length // CHUNK_ENTRY):
+        msg = f"{name} lies in {chunks} pieces, more than a file of {length} bytes holds. It is damaged."
+        raise FileFormatError(msg, path="")
+
+
 def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN401  # h5py is untyped
     if "MATLAB_sparse" in item.attrs:
         return _sparse(item, name, length)
@@ -187,15 +207,20 @@ def _value(file: Any, item: Any, name: str, length: int) -> Value:  # noqa: ANN4
         return [row for cell in cells for row in _rows(_checked(cell, name, length))]
     if _is_char(item):
         return _rows(data)
+    if item.attrs.get("MATLAB_class", NUMERIC_CLASSES[0]) not in NUMERIC_CLASSES:
+        raise another_kind(name)
     return _numbers(data, name).T
 
 
 def _without_zeros(item: Any, name: str, length: int) -> csc_array:  # noqa: ANN401
     """Read a full matrix of zeros mostly, some columns at a time."""
     step = max(1, PIECE // max(1, item.dtype.itemsize * item.shape[-1]))
-    at_once = math.prod(item.chunks) * item.dtype.itemsize
-    if len(item.shape) != 2 or item.is_virtual or item.external or at_once > most_unpacked(length):  # noqa: PLR2004
-        raise out_of_room(name, item.size * item.dtype.itemsize, length)
+    at_once, again = math.prod(item.chunks) * item.dtype.itemsize, -(-item.chunks[0] // step)
+    size = item.size * item.dtype.itemsize
+    readable = at_once <= most_unpacked(length) and size * again <= MOST_READ_AGAIN
+    if len(item.shape) != 2 or item.is_virtual or item.external or not readable:  # noqa: PLR2004
+        raise out_of_room(name, size, length)
+    _require_few_chunks(item, name, length)
     pieces = (np.asarray(item[start : start + step]).tobytes() for start in range(0, item.shape[0], step))
     return without_zeros(pieces, item.dtype, item.shape[::-1], name, length, by_columns=True)
 
@@ -211,6 +236,7 @@ def _checked(item: Any, name: str, length: int) -> npt.NDArray[Any]:  # noqa: AN
             f"{name} has {item.size} entries, more than are read from a file of {length} bytes. Reduce the model first."
         )
         raise FileFormatError(msg, path="")
+    _require_few_chunks(item, name, length)
     return np.asarray(item[()])
 
 

@@ -14,7 +14,9 @@ from scipy.sparse import coo_array, csc_array
 
 from halfdof_ctrl.files.formats.variables import most_unpacked, out_of_room
 
-PIECE = 2**20  #: bytes that are unpacked at once
+PIECE = 2**19  #: bytes that are unpacked at once
+NUMBERS_AT_ONCE = 2**14  #: of a piece that are looked at together: their places and values take far more bytes
+BYTES_OF_NONZERO = 32  #: its place and its value, twice while they are joined
 MOSTLY_ZEROS_LARGEST = 2**31  #: bytes in all, 16 000 x 16 000 numbers, which take seconds to look through
 
 
@@ -60,12 +62,14 @@ def without_zeros(
         whole = len(joined) // dtype.itemsize
         numbers = np.frombuffer(joined, dtype, whole)
         rest = joined[whole * dtype.itemsize :]
-        nonzero = np.flatnonzero(numbers)
-        stored += nonzero.size
-        if 2 * stored * dtype.itemsize > most_unpacked(length):
-            raise out_of_room(name, count * dtype.itemsize, length)
-        places.append(nonzero + done)
-        values.append(numbers[nonzero].astype(np.float64))
+        for start in range(0, whole, NUMBERS_AT_ONCE):
+            nonzero = np.flatnonzero(numbers[start : start + NUMBERS_AT_ONCE]) + start
+            stored += nonzero.size
+            if stored * BYTES_OF_NONZERO > most_unpacked(length):
+                raise out_of_room(name, count * dtype.itemsize, length)
+            if nonzero.size:
+                places.append(nonzero + done)
+                values.append(numbers[nonzero].astype(np.float64))
         done += whole
         if done > count:
             break

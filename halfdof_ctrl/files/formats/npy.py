@@ -24,13 +24,14 @@ from scipy.sparse import coo_array, csc_array, csr_array
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.mostly_zeros import PIECE, without_zeros
 from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS
-from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, most_unpacked, out_of_room
+from halfdof_ctrl.files.formats.variables import Kind, Value, Variable, most_unpacked, name_twice, out_of_room
 
 Array: TypeAlias = npt.NDArray[Any]
 
 MAGIC = b"\x93NUMPY"
 ZIP_HEADER = b"PK\x03\x04"
 LONGEST_HEADER = 10_000  #: characters, as numpy.load allows
+LONGEST_SIZE = 18  #: digits
 LENGTH_BYTES = {1: 2, 2: 4, 3: 4}  #: of the header's length, by version
 NPY_HEADER = re.compile(
     r"\s*\{\s*'descr'\s*:\s*'(?P<type>[<>|=]?[a-zA-Z]\d*)'\s*,\s*'fortran_order'\s*:\s*(?P<order>True|False)\s*,"
@@ -128,6 +129,9 @@ def npz_variables(content: bytes) -> list[Variable]:
         raise FileFormatError(msg, path="")
     with zipfile.ZipFile(io.BytesIO(content)) as members:
         infos = {info.filename.removesuffix(".npy"): info for info in members.infolist()}
+        if len(infos) < len(members.infolist()):
+            names = [info.filename.removesuffix(".npy") for info in members.infolist()]
+            raise name_twice(next(name for name in names if names.count(name) > 1))
         if not any(info.filename.endswith(".npy") for info in infos.values()):
             what = "a spreadsheet: save it as csv" if "xl/workbook.xml" in infos else "an archive of other files"
             msg = f"there are no arrays in it, it is {what}."
@@ -157,13 +161,20 @@ def _header(content: bytes, name: str) -> _Header:
         raise FileFormatError(msg, path="")
     if match is None:
         return _Header(None, fortran_order=False, shape=(), start=start + length)
-    shape = tuple([int(size.strip("L")) for size in match["shape"].replace(" ", "").split(",") if size])
+    sizes = [size.strip("L") for size in match["shape"].replace(" ", "").split(",") if size]
+    if any(len(size) > LONGEST_SIZE for size in sizes):
+        msg = f"{name} has a header that is none of numpy.save: a size of {max(map(len, sizes))} digits. It is damaged."
+        raise FileFormatError(msg, path="")
+    shape = tuple([int(size) for size in sizes])
     dtype = None if "O" in match["type"] else np.dtype(match["type"])
     return _Header(dtype, match["order"] == "True", shape, start + length)
 
 
 def _member(content: bytes, members: zipfile.ZipFile, info: zipfile.ZipInfo, name: str) -> Variable:
     """Describe one array by its header."""
+    if info.compress_type not in {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}:  # others unpack without a limit
+        msg = f"{name} is packed as numpy.savez_compressed packs nothing. Write it anew."
+        raise FileFormatError(msg, path="")
     with members.open(info) as stream:
         header = _header(stream.read(len(MAGIC) + 6 + LONGEST_HEADER), name)
     return Variable(name=name, kind=header.kind, shape=header.shape, read=partial(_read_member, content, info, name))

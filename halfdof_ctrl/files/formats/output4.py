@@ -36,11 +36,12 @@ from halfdof_ctrl.files.formats.output4_binary import (
     binary_strings,
 )
 from halfdof_ctrl.files.formats.output4_forms import declared_by_form, doubts_of_form, meant_by_form
-from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled
+from halfdof_ctrl.files.formats.raw_matrix import MOST_ROWS, RawMatrix, assembled, most_rows
 from halfdof_ctrl.files.formats.text_blocks import LONGEST_LINE, Lines, fixed_width, printable
 
 OP4_COMPLEX_TYPES, DOUBLE_TYPES, OP4_TYPES = (3, 4), (2, 4), range(1, 5)
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
+MOST_SETS = 4  #: matrices of as many columns as the file has bytes
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
 NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
@@ -130,7 +131,14 @@ def read_output4(content: bytes, room: int = MOST_ROWS) -> list[RawMatrix]:
         finite, no matrix at all.
     """
     order = _byte_order(content)
-    found = list(_text_matrices(Lines(content), room) if order is None else _binary_matrices(content, order, room))
+    found: list[RawMatrix] = []
+    columns = 0
+    for raw in _text_matrices(Lines(content), room) if order is None else _binary_matrices(content, order, room):
+        found.append(raw)
+        columns += raw.matrix.shape[1]
+        if columns > MOST_SETS * most_rows(len(content)):
+            msg = f"matrices of {columns} columns in all in a file of {len(content)} bytes. {DAMAGED}"
+            raise FileFormatError(msg, path="")
     if not found:
         msg = "no matrix in it. Write it by OUTPUT4 or EXTSEOUT(ASMBULK,EXTBULK,DMIGOP2 or MATOP4)."
         raise FileFormatError(msg, path="")

@@ -26,6 +26,7 @@ TWICE = (
     "has {} entries at places that have one already, and they are added up: these are matrices of elements that nobody "
     "assembled, or lines that stand twice"
 )
+LONELY = 1e-9  #: of the largest entry: smaller ones may be rounding, without a partner
 EQUAL_PAIRS = 1e-6  #: relative; both entries of a pair, printed in decimals, may differ by rounding
 
 
@@ -109,9 +110,32 @@ def assembled(
     doubts = tuple(words.pop("doubts", ()))
     if matrix.nnz < rows.size:
         doubts = (*doubts, TWICE.format(rows.size - matrix.nnz))
+    doubts = (*doubts, *_lonely(matrix, declared))
     matrix.eliminate_zeros()
     raw = RawMatrix(matrix=matrix, declared=declared, stored=storage(matrix), completed=False, doubts=doubts, **words)
     return completed(raw) if declared in {"symmetric", "skew-symmetric"} and raw.stored != "diagonal" else raw
+
+
+def _lonely(matrix: csc_array, declared: Declared) -> tuple[str, ...]:
+    """Doubt a matrix some of whose off-diagonal entries have their partner and others lack it.
+
+    A file has both entries of a pair or one of each, except where a matrix is unsymmetric: then most have both.
+    """
+    if declared == "unsymmetric" or matrix.shape[0] != matrix.shape[1]:
+        return ()
+    entries = matrix.tocoo()
+    row, column = entries.row.astype(np.int64), entries.col.astype(np.int64)
+    if not ((row > column).any() and (row < column).any()):
+        return ()
+    places = np.sort(column * matrix.shape[0] + row)
+    partners = row * matrix.shape[0] + column
+    has_partner = places[np.minimum(np.searchsorted(places, partners), places.size - 1)] == partners
+    counts = (row != column) & (np.abs(entries.data) > LONELY * np.abs(entries.data).max())
+    both, alone = int((counts & has_partner).sum()), int((counts & ~has_partner).sum())
+    if both and alone and (declared in {"symmetric", "skew-symmetric"} or alone > both):
+        words = f"has {alone} entries without their partner across the diagonal, and {both} with it"
+        return (f"{words}: some may be lost, or have a damaged place",)
+    return ()
 
 
 def most_rows(length: int) -> int:

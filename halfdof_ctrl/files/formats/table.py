@@ -22,13 +22,14 @@ from halfdof_ctrl.files.formats.text_blocks import BOM, number_rows
 
 COMMENTS = (b"#", b"%", b"//", b"!")
 UTF16 = (b"\xff\xfe", b"\xfe\xff")
-LIKE_NUMBER = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([EeDdQq][-+]?\d+|[-+]\d{2,3})?")
+LIKE_NUMBER = re.compile(rb"[-+]?(\d+(\.\d*)?|\.\d+)([EeDdQq][-+]?\d+|[-+]\d{2,3})?")
 TITLE_BEGIN = re.compile(rb"[A-Za-z_\"'\x80-\xff]")  #: begins the title of a column
 NO_NAMES = (b"nan", b"inf", b"infinity", b"i", b"j")
 REMARK = re.compile(rb"(#|%|//|!)[^\n]*")
 DIGITS_ALONE = re.compile(rb"\d+")
 DECIMAL_COMMA = re.compile(rb"(?<=\d),(?=\d)")
 TABLE_HEAD = 2**16  #: bytes in which the first line of data must stand
+HEAD_LINES = 3  #: that are looked at however long they are: titles and two rows
 TABLE_SYMMETRY = 1e-9  #: of the largest entry
 TRIPLET, LABELLED_TABLE = 3, 5  #: numbers of a line that may be places and a value
 SIZES_LINE = 3  #: numbers of a line of sizes
@@ -97,8 +98,11 @@ def read_table(content: bytes, *, dense: bool, most_rows: int) -> RawMatrix:
 
 
 def _first_lines(content: bytes) -> list[tuple[int, bytes]]:
-    """Return the first lines that are neither empty nor comments, with their numbers."""
-    lines = enumerate(content[:TABLE_HEAD].split(b"\n"))
+    """Return the first lines that are neither empty nor comments, with their numbers; at least two whole ones."""
+    stop = TABLE_HEAD
+    while len(content) > stop and content.count(b"\n", 0, stop) < HEAD_LINES:
+        stop = (content.find(b"\n", stop) + 1) or len(content)
+    lines = enumerate(content[:stop].split(b"\n"))
     return [
         (number, line.rstrip(b"\r"))
         for number, line in lines

@@ -27,6 +27,7 @@ TOO_SHORT = "lines are far shorter than their fields"
 MOST_GROWTH = 10  #: times that lines may grow when blanks at their ends are filled in,
 FREE_SPREAD = 2**20  #: beyond so many bytes
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
+FIELD = re.compile(rb"\S+")
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
 
 
@@ -229,14 +230,15 @@ def _has_rows(text: bytes, comment: str) -> bool:
 def _bad_row(text: bytes, columns: int, comment: str, first_line: int) -> FileFormatError:
     """Find the first row that is wrong."""
     for number, whole in enumerate(text.split(b"\n"), start=first_line):
-        fields = whole.split(comment.encode())[0].split()
-        if not fields:
+        row = whole.split(comment.encode(), 1)[0]
+        count = sum(1 for _ in FIELD.finditer(row))
+        if not count:
             continue
         shown = repr(whole[:60].decode("latin-1").strip())
-        if len(fields) != columns:
-            msg = f"{len(fields)} numbers where a row has {columns}: {shown}. The file is damaged or cut short."
+        if count != columns:
+            msg = f"{count} numbers where a row has {columns}: {shown}. The file is damaged or cut short."
             return FileFormatError(msg, path="", line=number)
-        if not all(_is_finite_number(field) for field in fields):
+        if not all(_is_finite_number(field) for field in row.split()):
             msg = f"something that is no finite number: {shown}. The file is damaged or of another kind."
             return FileFormatError(msg, path="", line=number)
     return FileFormatError("rows that are no numbers. The file is damaged.", path="", line=first_line)

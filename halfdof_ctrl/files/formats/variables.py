@@ -1,7 +1,7 @@
 """A variable of a file that holds several by name: what it is, known before it is read."""
 
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
@@ -16,6 +16,7 @@ Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
 Kind: TypeAlias = Literal["matrix", "text", "struct", "cell", "object"]
 
 MOST_PARTS = 1000  #: of a struct or cell array that are listed
+MOST_VARIABLES = 4000  #: of a workspace
 EXPANSION = 10  #: bytes that are unpacked of a packed byte
 FREE_BYTES = 2**22  #: that may be unpacked whatever the file's length: 700 x 700 numbers
 PLANE = 2  #: dimensions of a matrix
@@ -30,6 +31,12 @@ class Variable:
     shape: tuple[int, ...]
     read: Callable[[], Value]  #: raises what damaged bytes make of it, and FileFormatError for another kind
     parts: Callable[[], list["Variable"]] = list  #: of a struct or cell array
+
+    def __post_init__(self) -> None:
+        """Take away what a terminal would obey in the name."""
+        if not self.name.isprintable():
+            shown = "".join([letter if letter.isprintable() else "?" for letter in self.name])
+            object.__setattr__(self, "name", shown)
 
     @property
     def is_matrix(self) -> bool:
@@ -83,6 +90,39 @@ def out_of_room(name: str, size: int, length: int) -> FileFormatError:
         "zeros mostly, save it sparse."
     )
     return FileFormatError(msg, path="")
+
+
+def require_few(count: int) -> None:
+    """Refuse a workspace of more variables than anybody has, whose descriptions take far more bytes than it has itself.
+
+    Raises
+    ------
+    FileFormatError
+        There are more than `MOST_VARIABLES`.
+    """
+    if count > MOST_VARIABLES:
+        msg = f"it holds more than {MOST_VARIABLES} variables. Save those of the model: save(file, 'M', 'C', 'K')."
+        raise FileFormatError(msg, path="")
+
+
+def require_names_once(found: Sequence[Variable]) -> None:
+    """Refuse a file with two variables of one name, of which one would be read and nobody knew which.
+
+    Raises
+    ------
+    FileFormatError
+        There are two.
+    """
+    names: set[str] = set()
+    for variable in found:
+        if variable.name and variable.name in names:
+            raise name_twice(variable.name)
+        names.add(variable.name)
+
+
+def name_twice(name: str) -> FileFormatError:
+    """Make the refusal of a name that stands twice."""
+    return FileFormatError(f"there are two variables {name!r} in it. Write it anew, with one of them.", path="")
 
 
 def require_ascending(name: str, rows: IndexArray, starts: IndexArray) -> None:

@@ -59,3 +59,9 @@ def test_the_model_keeps_what_its_entries_are_known_to() -> None:
     model = replace(mechss(np.eye(2), None, 2 * np.eye(2), dofs=["a", "b"]), known_to=5e-10)
     assert model.select("F_a", "b").known_to == model.prescribe_motion("a").known_to == 5e-10
     assert "known to 5e-10" in repr(model)
+
+
+def test_a_number_without_an_end_is_looked_at_once() -> None:
+    """Not from each of its digits on, which takes minutes."""
+    assert digits_of(b"1" * 2**17) is None
+    assert digits_of(b"3.14159 2.71828 1.41421 " + b"7" * 2**16) == 6

@@ -134,3 +134,21 @@ def test_any_choice_of_one_entry_a_pair_gives_the_whole_matrix_back(seed: int) -
     np.testing.assert_array_equal(found.matrix.toarray(), whole)
     assert storage(found.matrix) in {"both", "diagonal"}
     assert completed(found).matrix.nnz == found.matrix.nnz
+
+
+@pytest.mark.parametrize("declared", ["symmetric", "unsaid"])
+def test_pairs_of_which_some_lack_an_entry_are_doubted(declared: Declared) -> None:
+    """A symmetric matrix with one place changed has a pair and lone entries; rounding in a full one is none."""
+    places = np.array([[1, 0], [2, 0], [0, 2], [3, 1], [3, 2]]).T
+    found = assembled(*places, np.array([1.0, 2.0, 2.0, 4.0, 5.0]), (4, 4), declared=declared, format="test")
+    assert found.doubts[0].startswith("has 3 entries without their partner across the diagonal, and 2 with it")
+    rounded = np.array([[4.0, 1.0, 1e-12], [1.0, 4.0, 2.0], [0.0, 2.0, 4.0]])
+    assert not assembled(
+        *rounded.nonzero(), rounded[rounded.nonzero()], (3, 3), declared=declared, format="test"
+    ).doubts
+
+
+def test_an_unsymmetric_matrix_may_lack_some_partners() -> None:
+    """As that of a brake with friction; most pairs are whole."""
+    matrix = np.array([[4.0, 1.0, 7.0], [1.0, 4.0, 2.0], [0.0, 2.0, 4.0]])
+    assert not assembled(*matrix.nonzero(), matrix[matrix.nonzero()], (3, 3), declared="unsaid", format="test").doubts

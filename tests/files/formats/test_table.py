@@ -119,3 +119,13 @@ def test_files_that_count_from_zero_and_from_one_do_not_make_a_model(tmp_path: P
     (tmp_path / "M.txt").write_text("1 1 2.5\n2 2 2.5\n")
     with pytest.raises(FileFormatError, match=r"counted from 0, but M\.txt has no entry in a row 0"):
         load_model({"K": tmp_path / "K.txt", "M": tmp_path / "M.txt"})
+
+
+@pytest.mark.parametrize("titles", [False, True])
+def test_rows_longer_than_what_is_looked_at_first_are_read_whole(*, titles: bool) -> None:
+    """A row of 3600 numbers takes more than 64 kB."""
+    n = 3600
+    row = b" ".join([b"0.0000000000000000"] * (n - 1))
+    head = b" ".join([b"column%d" % number for number in range(n)]) + b"\n"
+    with pytest.raises(FileFormatError, match=f"{n - 1} numbers where a row has {n}"):
+        read_table((head if titles else b"") + b"1.5 " + row + b"\n1.5 " + row + b"\n" + row, dense=False, most_rows=n)
