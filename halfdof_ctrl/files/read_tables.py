@@ -6,14 +6,18 @@ from pathlib import Path
 
 import control
 import numpy as np
+import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.files.containers import PathLike, ending
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.stiffness_tables import is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
+
+AGREEMENT = 1e-6  #: relative; tables that went through a spreadsheet have lost digits
+MANY_STEPS, FEW_GAPS, LONG_STEP = 8, 2, 1.5  #: steps of time that tell what is usual, and longer ones that are not
 
 
 def load_response(path: PathLike) -> control.FrequencyResponseData | control.TimeResponseData:
@@ -36,7 +40,8 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     Raises
     ------
     FileFormatError
-        Another ending, a table of neither kind, a stiffness without units; `line` says where.
+        Another ending, a table of neither kind, a stiffness without units, rows whose numbers contradict each other,
+        times that do not rise or have a gap; `line` says where.
     OSError
         The file cannot be read.
 
@@ -57,7 +62,7 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
         return _frequency_response(list(map(without_guard, header)), _numbers(rows, path), path)
     if header[:1] == [TIME_HEAD]:
-        return _time_response(list(map(without_guard, header[1:])), _numbers(rows, path))
+        return _time_response(list(map(without_guard, header[1:])), _numbers(rows, path), path)
     if is_stiffness_table(header):
         return stiffness_response(header, _numbers(rows, path), path)
     msg = (
@@ -123,6 +128,7 @@ def _frequency_response(header: Sequence[str], values: FloatArray, path: PathLik
     parts = values[first:].reshape(len(outputs), len(inputs), count, -1)
     response = np.empty(parts[:, :, 0].shape, dtype=np.complex128)
     response.real, response.imag = parts[:, :, 0], parts[:, :, 1]
+    _require_agreement(values, response, parts, path)
     return control.FrequencyResponseData(
         response,
         values[0],
@@ -133,7 +139,44 @@ def _frequency_response(header: Sequence[str], values: FloatArray, path: PathLik
     )
 
 
-def _time_response(names: Sequence[str], values: FloatArray) -> control.TimeResponseData:
+def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatArray, path: PathLike) -> None:
+    """Refuse a row whose numbers contradict each other: all of them say everything twice."""
+    with np.errstate(invalid="ignore"):
+        sound = _close(values[0], 2.0 * np.pi * values[1]) & _close(np.abs(response), parts[:, :, 2]).all(axis=(0, 1))
+        turned = parts[:, :, 2] * np.exp(1j * np.radians(parts[:, :, 3]))
+        off = np.abs(turned - response) > AGREEMENT * np.abs(response)
+    sound &= ~off.any(axis=(0, 1))
+    if not sound.all():
+        line = int(np.argmin(sound)) + 2
+        msg = (
+            f"{path}, line {line}: its numbers contradict each other: omega is 2 pi f, magnitude and phase are those of "
+            "the real and imaginary part. The file is damaged, or was changed by hand."
+        )
+        raise FileFormatError(msg, path=str(path), line=line)
+
+
+def _close(found: FloatArray, expected: FloatArray) -> npt.NDArray[np.bool_]:
+    return np.isclose(found, expected, rtol=AGREEMENT, atol=0.0, equal_nan=True)
+
+
+def _require_times(times: FloatArray, path: PathLike) -> None:
+    """Refuse times that do not rise, and a few steps among equal ones that are multiples of these."""
+    steps = np.diff(times)
+    wrong = ~(steps > 0.0)
+    what = "times do not rise"
+    if not wrong.any() and steps.size >= MANY_STEPS:
+        step = float(np.median(steps))
+        long = steps > LONG_STEP * step
+        if 0 < int(long.sum()) <= FEW_GAPS and _close(steps[~long], np.full(steps.size - int(long.sum()), step)).all():
+            wrong, what = long, "lines are missing before it: all other steps of time are equal and shorter"
+    if wrong.any():
+        line = int(np.argmax(wrong)) + 3
+        msg = f"{path}, line {line}: {what}. The file is damaged: write or copy it anew."
+        raise FileFormatError(msg, path=str(path), line=line)
+
+
+def _time_response(names: Sequence[str], values: FloatArray, path: PathLike) -> control.TimeResponseData:
+    _require_times(values[0], path)
     grid = _grid(names)
     if grid is None:
         return control.TimeResponseData(

@@ -48,3 +48,41 @@ def test_a_damaged_table_is_refused_with_its_line(tmp_path: Path) -> None:
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(FileFormatError, match="this is no file"):
         load_response(tmp_path / "folder.csv")
+
+
+@pytest.mark.parametrize("column", range(6))
+def test_numbers_of_a_row_that_contradict_each_other_are_refused(tmp_path: Path, column: int) -> None:
+    """Omega and f, parts and magnitude and phase: a changed digit in any of them is found, in the order as saved."""
+    path = tmp_path / "table.csv"
+    model = mechss([[1.0]], [[1.0]], [[4.0]])
+    data = frequency_response(model, np.array([3.0, 1.0, 2.0, 2.0, 0.5]))
+    save_response(data, path)
+    np.testing.assert_array_equal(load_response(path).omega, data.omega)
+    table = cells(path)
+    table[2][column] = repr(float(table[2][column]) * 1.01)
+    path.write_text("".join([",".join(row) + "\n" for row in table]))
+    with pytest.raises(FileFormatError, match="line 3: its numbers contradict each other"):
+        load_response(path)
+
+
+@pytest.mark.parametrize(
+    ("order", "message"),
+    [
+        ([0, 1, 2, 2, *range(3, 12)], "line 5: times do not rise"),
+        ([0, 2, 1, *range(3, 12)], "line 4: times do not rise"),
+        ([0, 1, 2, *range(5, 20)], "line 5: lines are missing before it"),
+    ],
+)
+def test_rows_of_a_time_response_that_were_lost_doubled_or_moved_are_refused(
+    tmp_path: Path, order: list[int], message: str
+) -> None:
+    """Times rise, in equal steps or in steps that all differ."""
+    path = tmp_path / "table.csv"
+    data = step_response(mechss([[1.0]], [[1.0]], [[4.0]]), np.linspace(0.0, 2.0, 20))
+    save_response(data, path)
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *[rows[number] for number in order]]) + "\n")
+    with pytest.raises(FileFormatError, match=message):
+        load_response(path)
+    path.write_text("\n".join([head, *[rows[number] for number in (0, 1, 3, 4, 8, 10, 11, 15, 16, 19)]]) + "\n")
+    assert load_response(path).t.size == 10
