@@ -149,8 +149,8 @@ def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatA
     if not sound.all():
         line = int(np.argmin(sound)) + 2
         msg = (
-            f"{path}, line {line}: its numbers contradict each other: omega is 2 pi f, magnitude and phase are those of "
-            "the real and imaginary part. The file is damaged, or was changed by hand."
+            f"{path}, line {line}: its numbers contradict each other: omega is 2 pi f, magnitude and phase are those "
+            "of the real and imaginary part. The file is damaged, or was changed by hand."
         )
         raise FileFormatError(msg, path=str(path), line=line)
 

@@ -45,7 +45,7 @@ class CutLines:
         (lines, width) ndarray
         """
         starts, lengths = (self.starts, self.lengths) if which is None else (self.starts[which], self.lengths[which])
-        reach = int(self.starts[-1]) + start + width if self.starts.size else width
+        reach = int(starts.max(initial=0)) + start + width
         text = self.text
         if reach > text.size:
             text = np.concatenate([text, np.full(reach - text.size, BLANK, dtype=np.uint8)])

@@ -10,6 +10,7 @@ A file with anything else about these entries (small fields, commas, tabs, other
 no numbers) is left to the reader in `dmig`, which knows all layouts and names the line that is wrong.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,6 +41,7 @@ STAR, PLUS, DMIG_PUNCH_REMARK = ord("*"), ord("+"), ord("$")
 EXPONENTS = np.frombuffer(AS_PYTHON, dtype=np.uint8)  #: what each character becomes for Python
 DMIG_PUNCH_EXTRN, DMIG_PUNCH_SMALL = b"\nEXTRN   ", 8
 DIGIT = 9
+BLOCK = 2**14  #: lines that are read at once
 GOES_ON = np.array([BLANK, PLUS], dtype=np.uint8)  #: first characters of the lines by which an EXTRN entry goes on
 OTHER_MARKS = (b"\t", b",", b"_", b"dmig")  #: of the layouts that are not read here
 
@@ -125,13 +127,22 @@ def _matrix(lines: CutLines, header: str, heads: Integers, stops: Integers) -> P
     if longest > FULL_LINE and any((lines.cut(FULL_LINE, longest, part) != BLANK).any() for part in (rows, heads)):
         msg = "more than four fields"
         raise ValueError(msg)
-    parts = [_values(lines, LEAD + place * FIELD, rows) for place in (2, 3)]
+    values = np.empty((rows.size, 2))
+    for place in (2, 3):
+        values[:, place - 2] = _by_blocks(_values, lines, LEAD + place * FIELD, rows)
     return PunchedMatrix(
         header=[header[place : place + 8] for place in range(8, FULL_LINE, 8)],
-        rows=_keys(lines, LEAD, rows),
-        columns=np.repeat(_keys(lines, LEAD + FIELD, heads), counts),
-        values=np.column_stack(parts),
+        rows=_by_blocks(_keys, lines, LEAD, rows),
+        columns=np.repeat(_by_blocks(_keys, lines, LEAD + FIELD, heads), counts),
+        values=values,
     )
+
+
+def _by_blocks(
+    read: Callable[[CutLines, int, Integers], npt.NDArray[Any]], lines: CutLines, start: int, which: Integers
+) -> npt.NDArray[Any]:
+    """Read a field of many lines some at a time: what is made in between stays in the processor's cache."""
+    return np.concatenate([read(lines, start, which[at : at + BLOCK]) for at in range(0, max(which.size, 1), BLOCK)])
 
 
 def _values(lines: CutLines, start: int, which: Integers) -> npt.NDArray[Any]:
