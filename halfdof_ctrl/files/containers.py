@@ -26,6 +26,7 @@ from halfdof_ctrl.files.naming import naming_the_file
 PathLike: TypeAlias = str | os.PathLike[str]
 Content: TypeAlias = Mapping[str, Any]
 
+LARGEST_NAME = 2.0**53  #: above it a float64 does not tell neighbouring whole numbers apart
 MATRIX_ENDINGS = (".npz", ".mat")
 ARRAY_ENDINGS = (*MATRIX_ENDINGS, ".npy")
 
@@ -72,11 +73,13 @@ def variables(content: bytes, *, is_archive: bool) -> list[Variable]:
 
 
 def texts(content: Content, key: str) -> list[str] | None:
-    """Return names, which are a text array in .npz and a list of texts from .mat."""
+    """Return names, which are a text array in .npz, a list of texts from .mat, or whole numbers, as those of nodes."""
     value = content.get(key)
     if value is None or isinstance(value, list):
         return value
     array = np.asarray(value)
+    if array.dtype.kind in "iuf" and (array == np.rint(array)).all() and (np.abs(array) < LARGEST_NAME).all():
+        return [f"{int(number)}" for number in array.reshape(-1).tolist()]
     if array.size and array.dtype.kind not in "US":
         msg = f"{key} must be names, but it holds entries of type {array.dtype}. Give text (in MATLAB a cellstr)."
         raise FileFormatError(msg, path="")

@@ -139,7 +139,7 @@ def _names_signals(key: str, variable: Variable, size: int) -> bool:
     """Tell names of DOFs and signals from what else is called dofs, inputs, elements in a workspace."""
     if key in SAVED_TEXTS:
         return variable.kind == "text" or (variable.kind == "cell" and all(_is_text(part) for part in variable.parts()))
-    if variable.kind == "matrix":  # as many numbers as there are DOFs are meant as their names, and refused as such
+    if variable.kind == "matrix":  # as many numbers as there are DOFs are meant as their names
         return key == "dofs" and variable.shape in {(size,), (size, 1), (1, size)}
     return variable.kind in {"text", "cell", "object"}
 

@@ -273,7 +273,7 @@ def test_objects_are_not_unpickled(tmp_path: Path) -> None:
         ({"K": [["a"]]}, "K holds entries of type <U1", MatrixError),
         ({"K": K, "M": K, "C": [[1.0]]}, r"differ in size \(M 2 x 2, C 1 x 1, K 2 x 2\)", type(None)),
         ({"K": K, "dofs": ["y", "y"]}, "Names of DOFs must differ", SignalNameError),
-        ({"K": K, "dofs": [1.0, 2.0]}, "dofs must be names, but it holds entries of type float64", FileFormatError),
+        ({"K": K, "dofs": [1.5, 2.0]}, "dofs must be names, but it holds entries of type float64", FileFormatError),
         ({"K": K, "M": K, "C": K, "name": ["a", "b"]}, "name must be one text, but it has 2", FileFormatError),
     ],
 )
@@ -424,3 +424,18 @@ def test_a_mapping_that_fails_is_refused_by_the_name_of_its_argument() -> None:
         load_model(Broken())
     with pytest.raises(ParameterError, match=r"matrices is called as a mapping.*RuntimeError: out of order"):
         inspect_files("model.npz", matrices=Broken())
+
+
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.base.errors.ImportedModelWarning")
+@pytest.mark.parametrize("numbers", [np.array([101, 20002]), np.array([[101.0], [20002.0]])])
+@pytest.mark.parametrize("ending", ["npz", "mat"])
+def test_numbers_of_nodes_are_names_of_dofs(tmp_path: Path, ending: str, numbers: np.ndarray) -> None:
+    """As `mechss` takes whole numbers in a list; MATLAB has them as doubles."""
+    path = tmp_path / f"a.{ending}"
+    if ending == "npz":
+        np.savez(path, K=K, M=np.eye(2), dofs=numbers)
+    else:
+        scipy.io.savemat(path, {"K": K, "M": np.eye(2), "dofs": numbers})
+    model = load_model(path)
+    assert (model.dofs, model.inputs) == (("101", "20002"), ("F_101", "F_20002"))
+    assert load_model(path).select("F_101", "20002").outputs == ("20002",)
