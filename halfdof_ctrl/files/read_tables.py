@@ -1,7 +1,9 @@
 """The way back of `save_response`: tables of frequency and time responses."""
 
 import csv
-from collections.abc import Sequence
+import io
+from array import array
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import control
@@ -57,8 +59,8 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     """
     ending(path, TABLE_ENDINGS)
     text = _text(Path(path))
-    rows = list(csv.reader(text.splitlines(), delimiter=_separator(text)))
-    header = rows[0] if rows else []
+    header = next(_rows(text, path), [])
+    rows = _rows(text, path)
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
         return _frequency_response(list(map(without_guard, header)), _numbers(rows, path), path)
     if header[:1] == [TIME_HEAD]:
@@ -93,25 +95,44 @@ def _text(path: Path) -> str:
     return text
 
 
+def _rows(text: str, path: PathLike) -> Iterator[list[str]]:
+    """Cut a table into cells."""
+    rows = csv.reader(io.StringIO(text, newline=None), delimiter=_separator(text))
+    try:
+        yield from rows
+    except csv.Error as cause:
+        msg = f"{path}, line {rows.line_num}: {cause}. The file is damaged, or no table."
+        raise FileFormatError(msg, path=str(path), line=rows.line_num) from cause
+
+
 def _separator(text: str) -> str:
     """Tell what stands between the columns of the first line."""
     first = text.partition("\n")[0]
     return next((mark for mark in (";", "\t") if mark in first), ",")
 
 
-def _numbers(rows: Sequence[Sequence[str]], path: PathLike) -> FloatArray:
+def _numbers(rows: Iterator[Sequence[str]], path: PathLike) -> FloatArray:
     """Read all lines but the first as numbers, (columns, rows)."""
-    values = np.empty((len(rows) - 1, len(rows[0])))
-    for number, row in enumerate(rows[1:], start=2):
-        if len(row) != len(rows[0]):
-            msg = f"{path}, line {number}: {len(row)} entries where the header has {len(rows[0])}. Is the file whole?"
+    width = len(next(rows))
+    values = array("d")
+    for number, row in enumerate(rows, start=2):
+        if len(row) != width:
+            msg = f"{path}, line {number}: {len(row)} entries where the header has {width}. Is the file whole?"
             raise FileFormatError(msg, path=str(path), line=number)
         try:
-            values[number - 2] = [float(entry) for entry in row]
+            values.extend([_number(entry) for entry in row])
         except ValueError as cause:
             msg = f"{path}, line {number}: {cause}."
             raise FileFormatError(msg, path=str(path), line=number) from cause
-    return values.T
+    return np.array(values).reshape(-1, width).T
+
+
+def _number(entry: str) -> float:
+    """Read a number, without the underscores that Python allows."""
+    if "_" in entry:
+        msg = f"could not convert string to float: {entry!r}"
+        raise ValueError(msg)
+    return float(entry)
 
 
 def _frequency_response(header: Sequence[str], values: FloatArray, path: PathLike) -> control.FrequencyResponseData:

@@ -35,6 +35,7 @@ ROLES = {
 }  #: names in small letters, and the units that a column of that kind has
 WAYS = (("storage", "loss"), ("modulus", "angle"), ("modulus", "ratio"), ("storage", "ratio"))
 STIFFNESS_TABLES_COLUMN = re.compile(r"^(.*?)\s*(?:\[(.*)\]|\((.*)\))?$")
+LONGEST_TITLE = 200  #: characters
 STIFFNESS, DISPLACEMENT = "stiffness", "displacement"
 
 
@@ -105,7 +106,7 @@ def _complex(columns: dict[str, FloatArray]) -> ComplexArray:
 
 def _role(name: str) -> tuple[str | None, str | None]:
     """Tell what a column is, and its unit."""
-    match = STIFFNESS_TABLES_COLUMN.match(name.strip())
+    match = STIFFNESS_TABLES_COLUMN.match(name.strip()) if len(name) <= LONGEST_TITLE else None
     words = "" if match is None else match.group(1).strip().lower()
     unit = None if match is None else match.group(2) or match.group(3)
     role = next((role for role, (names, _) in ROLES.items() if words in names), None)

@@ -86,3 +86,23 @@ def test_rows_of_a_time_response_that_were_lost_doubled_or_moved_are_refused(
         load_response(path)
     path.write_text("\n".join([head, *[rows[number] for number in (0, 1, 3, 4, 8, 10, 11, 15, 16, 19)]]) + "\n")
     assert load_response(path).t.size == 10
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("x" * 200_000, "line 1: field larger than field limit"),
+        ("(" * 100_000, "the first line is no header of a response"),
+        ("t [s],y\n0,1_0\n", "line 2: could not convert string to float: '1_0'"),
+        ("t [s],y\n0," + "1" * 200_000 + "\n", "line 2: field larger than field limit"),
+        ("t [s],y\n0,1,2\n", "line 2: 3 entries where the header has 2"),
+        ("", "the first line is no header of a response"),
+    ],
+    ids=range(6),
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, content: str, message: str) -> None:
+    """Cells without an end, brackets without an end, and numbers of another language."""
+    path = tmp_path / "table.csv"
+    path.write_text(content)
+    with pytest.raises(FileFormatError, match=message):
+        load_response(path)

@@ -1,12 +1,13 @@
 """The projection of a model on a few motions, in coordinates that show what has no mass."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.linalg
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix
 from halfdof_ctrl.base.sparse_products import times
@@ -72,7 +73,27 @@ def projected(
         inputs=model.inputs,
         outputs=model.outputs,
     )
-    return small, motions.shapes if turn is None else motions.shapes @ turn
+    basis = motions.shapes if turn is None else motions.shapes @ turn
+    known_to = _known_to(model.known_to, parts, basis, small)
+    return small if known_to == small.known_to else replace(small, known_to=known_to), basis
+
+
+def _known_to(full: float, parts: Parts, basis: FloatArray, small: SecondOrderModel) -> float:
+    """Return the relative rounding of projected entries, where those of the full model come from a file of few digits.
+
+    An entry of the small model is a sum over many of the full one, which cancel where a long structure bends: what its
+    terms lose at random adds up by squares. What cancels wholly, as the stiffness of a rigid motion, has no digits.
+    """
+    if full <= EPS:
+        return EPS
+    known, squares = full, basis**2
+    for letter in "MCK":
+        entries = np.abs(np.diagonal(getattr(small, letter)))
+        terms: Any = abs(parts[letter]).power(2)
+        lost = full * np.sqrt(np.einsum("ij,ij->j", squares, times(terms, squares)))
+        told = lost < entries
+        known = max(known, float((lost[told] / entries[told]).max(initial=0.0)))
+    return known
 
 
 def _between(basis: FloatArray, matrix: SparseMatrix) -> FloatArray:

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csc_array
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
+from halfdof_ctrl.base.digits import digits_in_words
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
@@ -260,7 +261,7 @@ def _measured(
     found, desired, limit = small(s, squeeze=False), np.empty((*model.D.shape, s.size), complex), []
     for k, point in enumerate(progress(s.tolist(), "frequencies")):
         desired[:, :, k] = full.at(point)
-        limit.append(full.limit.data)
+        limit.append(full.limit.of_entries_known_to(model.known_to).data)
     sound = np.isfinite(found) & np.isfinite(desired)
     difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
     errors, data = (_relative(part, size) for part in (difference, np.where(sound, np.stack(limit, axis=2), 0.0)))
@@ -272,6 +273,7 @@ def _measured(
         outputs=small.outputs,
         name=small.name,
         prescribed=model.prescribed,
+        known_to=small.known_to,
         full_size=len(model.dofs),
         kept=tuple([model.dofs[place] for place in motions.kept.tolist()]),
         mode_frequencies=read_only(motions.omega / (2.0 * np.pi)),
@@ -289,10 +291,11 @@ def _measured(
         float(data.max(initial=0.0)) / ALLOWED_ERROR, float(resonances.floor.max(initial=0.0)) / ALLOWED_SHIFT
     )
     large = truncated.max_error > ALLOWED_ERROR or truncated.max_shift > ALLOWED_SHIFT or height > ALLOWED_ERROR
+    known = "their last digit" if model.known_to <= EPS else digits_in_words(model.known_to)
     if large and undetermined > 1.0:
         msg = (
-            f"The small model is as far from the full one as rounding of the entries of M, C, K, known to their last "
-            f"digit, moves that itself: {said}. More modes do not help; fewer elements do."
+            f"The small model is as far from the full one as rounding of the entries of M, C, K, known to {known}, "
+            f"moves that itself: {said}. More modes do not help; fewer elements do."
         )
         give_warning(msg, TruncationWarning)
     elif large:

@@ -1,5 +1,6 @@
 """Small models of large ones: exact at rest, their error measured, their modes those of the full model."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from halfdof_ctrl import (
     save_model,
     truncate_modes,
 )
-from halfdof_ctrl.base.arrays import as_dense
+from halfdof_ctrl.base.arrays import EPS, as_dense
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -367,3 +368,24 @@ def long_cantilever(elements: int) -> SecondOrderModel:
         parts.append(csc_array(csc_array(coo_array(entries, shape=(size, size)))[2:][:, 2:]))
     tip = f"q{2 * elements - 2}"
     return mechss(parts[0], None, parts[1]).select(f"F_{tip}", tip)
+
+
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.LostDigitsWarning")
+def test_a_small_model_of_a_file_with_few_digits_says_what_its_entries_are_known_to() -> None:
+    """The stiffness of 200 springs in a row is a sum that cancels: it loses more digits than each of them."""
+    n, digits = 200, 5e-7
+    ends = np.array([0.0, *np.full(n - 1, -1.0), 0.0])
+    K = csc_array(diags_array([np.full(n, 2.0), ends[1:-1], ends[1:-1]], offsets=[0, 1, -1]))
+    name = f"q{n // 2}"
+    exact = mechss(csc_array(diags_array(np.ones(n))), 1e-3 * K, K).select(f"F_{name}", name)
+    known = truncate_modes(replace(exact, known_to=digits), n_modes=3)
+    assert truncate_modes(exact, n_modes=3).known_to == EPS
+    found = []
+    for seed in range(8):
+        noise = 1.0 + digits * np.random.default_rng(seed).uniform(-1.0, 1.0, (n, n))
+        rounded = csc_array(K.multiply(np.tril(noise) + np.tril(noise, -1).T))
+        small = truncate_modes(replace(exact, K=rounded, C=1e-3 * rounded), n_modes=3)
+        found.append(abs(small.K[0, 0] / known.K[0, 0] - 1.0))
+    assert 0.3 * known.known_to < max(found) < 3.0 * known.known_to  # at random, so neither all nor nothing
+    assert known.known_to > 10.0 * digits
+    assert float(known.data_limit.max()) > 1e6 * float(truncate_modes(exact, n_modes=3).data_limit.max())
