@@ -18,7 +18,7 @@ from halfdof_ctrl.base.errors import (
     ParameterError,
     give_warning,
 )
-from halfdof_ctrl.base.names import checked_names
+from halfdof_ctrl.base.names import checked_names, listed
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
 from halfdof_ctrl.files.containers import PathLike, single_text, texts
 from halfdof_ctrl.files.formats.raw_matrix import Triangle
@@ -50,7 +50,8 @@ def import_model(
     )
     first = next(iter(given.values())) if isinstance(given, Mapping) else given[0]
     if found.K is None:
-        also = f": {found.holds}" if found.holds else ". Give its file, or matrices={'K': name}"
+        other = f" It holds {listed(found.report.unused, most=24)} besides." if found.report.unused else ""
+        also = f": {found.holds}" if found.holds else f".{other} Give its file, or matrices={{'K': name}}"
         msg = f"{first}: no stiffness K in {', '.join(found.report.files)}{also}."
         raise FileFormatError(msg, path=str(first))
     chosen_by_hand = isinstance(given, Mapping) or len(given) > 1

@@ -70,7 +70,7 @@ class Sources:
         also = f"besides {listed(shown)} " if shown else ""
         signals = [_as_variable(source.raw) for source in self.signals.values() if source.raw.named]
         every = [*signals, *[variable for variables in self.left.values() for variable in variables]]
-        return f"{also}{listing(every)}" if every else ""
+        return f"{also}{listing(every, tuple(self.matrices))}" if every else ""
 
 
 def _as_variable(raw: RawMatrix) -> Variable:

@@ -7,7 +7,7 @@ else is guessed: the refusal lists what there is, with the argument that says it
 
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
 
@@ -158,14 +158,14 @@ def _require_matrices(chosen: Mapping[str | None, Variable], others: Sequence[Va
         raise FileFormatError(msg, path="")
 
 
-def listing(left: Sequence[Variable]) -> str:
-    """List what a file holds, with the argument that says which is which."""
+def listing(left: Sequence[Variable], known: Collection[str] = ()) -> str:
+    """List what a file holds, with the argument that says which is which, but for the letters that are known."""
     found = list(_with_parts(left))
     groups: dict[str, list[str]] = {}
     for variable in found:
         groups.setdefault(variable.words[len(variable.name) :], []).append(variable.name)
-    known = "; ".join([f"{listed(names, most=24)}{words}" for words, names in groups.items()]) or "nothing"
-    return f"it holds {known}. Say which is which: matrices={{{_proposal(found)}}}"
+    held = "; ".join([f"{listed(names, most=24)}{words}" for words, names in groups.items()]) or "nothing"
+    return f"it holds {held}. Say which is which: matrices={{{_proposal(found, known)}}}"
 
 
 def _format(is_archive: bool) -> str:  # noqa: FBT001  # as found
@@ -215,11 +215,13 @@ def _sound_parts(variable: Variable) -> list[Variable]:
         return []
 
 
-def _proposal(found: Sequence[Variable]) -> str:
+def _proposal(found: Sequence[Variable], known: Collection[str]) -> str:
     square = [variable for variable in found if variable.is_matrix and variable.shape[0] == variable.shape[-1]]
     words = []
     taken: set[str] = set()
     for letter, patterns in GUESSES.items():
+        if letter in known:
+            continue
         for pattern in patterns:
             hits = [
                 variable.name
@@ -232,7 +234,9 @@ def _proposal(found: Sequence[Variable]) -> str:
                 words.append(f"{letter!r}: {hits[0]!r}")
                 taken.add(hits[0])
                 break
-    return ", ".join(words) or "'K': name, 'M': name, 'C': name"
+    if "K" not in known and not any(word.startswith("'K'") for word in words):  # which no model is without
+        words = ["'K': name", *words]
+    return ", ".join(words if taken else [f"{letter!r}: name" for letter in GUESSES if letter not in known])
 
 
 def _rounding(named: Mapping[str, Variable], *, own_layout: bool) -> float:

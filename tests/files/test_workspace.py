@@ -266,3 +266,13 @@ def test_a_load_is_told_as_what_it_is_taken_for(tmp_path: Path) -> None:
     found = inspect_files(written(tmp_path / "a.mat", {**MODEL, "F": np.array([[0.0], [0.0], [1.0]])}))
     assert found.signals == ("B from a.mat: F",)
     assert found.unused == ()
+
+
+def test_what_is_missing_is_proposed_and_what_is_there_is_not(tmp_path: Path) -> None:
+    """C is known, so that B is not proposed for it; what K is called cannot be guessed."""
+    np.savez(tmp_path / "a.npz", A=K, B=M, C=C)
+    with pytest.raises(FileFormatError, match=r"besides C \(3 x 3\) it holds B, A \(3 x 3\).*\{'K': name, 'M': name\}"):
+        load_model(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", A=K, M=M, Damp=C)
+    with pytest.raises(FileFormatError, match=r"matrices=\{'K': name, 'C': 'Damp'\}"):
+        load_model(tmp_path / "b.npz")
