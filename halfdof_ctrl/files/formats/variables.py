@@ -87,7 +87,7 @@ def out_of_room(name: str, size: int, length: int) -> FileFormatError:
     """Make the refusal of what is out of proportion to its file."""
     msg = (
         f"{name} would take {size} bytes, more than are unpacked from {length}. If it is no damage but a matrix of "
-        "zeros mostly, save it sparse."
+        "zeros mostly, save it sparse; if it is sparse, without packing (numpy.savez, or MATLAB's save(..., '-v6'))."
     )
     return FileFormatError(msg, path="")
 
