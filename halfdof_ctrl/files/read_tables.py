@@ -11,11 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, give_warning
 from halfdof_ctrl.base.names import control_labels
 from halfdof_ctrl.files.containers import PathLike, ending
 from halfdof_ctrl.files.formats.text_blocks import is_cut_short
-from halfdof_ctrl.files.stiffness_tables import is_stiffness_table, stiffness_response
+from halfdof_ctrl.files.stiffness_tables import frequency_column, is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
 
 AGREEMENT = 1e-6  #: relative; tables that went through a spreadsheet have lost digits
@@ -47,6 +47,11 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     OSError
         The file cannot be read.
 
+    Warns
+    -----
+    ImportedModelWarning
+        A row stands twice, or frequencies turn back where others rise.
+
     Examples
     --------
     >>> import tempfile
@@ -62,11 +67,16 @@ def load_response(path: PathLike) -> control.FrequencyResponseData | control.Tim
     header = next(_rows(text, path), [])
     rows = _rows(text, path)
     if header[: len(FREQUENCY_HEAD)] == list(FREQUENCY_HEAD):
-        return _frequency_response(list(map(without_guard, header)), _numbers(rows, path), path)
+        values = _numbers(rows, path)
+        _doubt_order(values[0], values, path)
+        return _frequency_response(list(map(without_guard, header)), values, path)
     if header[:1] == [TIME_HEAD]:
         return _time_response(list(map(without_guard, header[1:])), _numbers(rows, path), path)
     if is_stiffness_table(header):
-        return stiffness_response(header, _numbers(rows, path), path)
+        values = _numbers(rows, path)
+        response = stiffness_response(header, values, path)
+        _doubt_order(values[frequency_column(header)], values, path)
+        return response
     msg = (
         f"{path}: the first line is no header of a response: it must begin with {FREQUENCY_HEAD[0]!r} and "
         f"{FREQUENCY_HEAD[1]!r}, or with {TIME_HEAD!r}, as save_response writes it; or name the columns of a measured "
@@ -158,6 +168,19 @@ def _frequency_response(header: Sequence[str], values: FloatArray, path: PathLik
         outputs=list(control_labels(outputs)),
         plot_type="bode",
     )
+
+
+def _doubt_order(frequencies: FloatArray, values: FloatArray, path: PathLike) -> None:
+    """Warn of a row that stands twice, and of frequencies that turn back: rows may have been doubled or moved."""
+    steps = np.diff(frequencies)
+    same = (values[:, 1:] == values[:, :-1]).all(axis=0)
+    turns = (steps < 0.0) & (steps > 0.0).any()
+    if not (same | turns).any():
+        return
+    line = int(np.argmax(same | turns)) + 3
+    what = "the same row as before" if same[line - 3] else "a frequency below the one before it, while others rise"
+    msg = f"{path}, line {line}: {what}. If the table was not measured so, rows of it were doubled or moved."
+    give_warning(msg, ImportedModelWarning)
 
 
 def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatArray, path: PathLike) -> None:

@@ -45,6 +45,15 @@ def is_stiffness_table(header: Sequence[str]) -> bool:
     return "frequency" in found and any(set(way) <= found for way in WAYS)
 
 
+def frequency_column(header: Sequence[str]) -> int:
+    """Return which column has the frequencies.
+
+    >>> frequency_column(["K' [N/m]", "K'' [N/m]", "f [Hz]"])
+    2
+    """
+    return [_role(name)[0] for name in header].index("frequency")
+
+
 def stiffness_response(header: Sequence[str], values: FloatArray, path: PathLike) -> control.FrequencyResponseData:
     """Read a measured stiffness.
 

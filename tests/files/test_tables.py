@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from halfdof_ctrl import load_response, lqr, mechss, step_response
-from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
 from halfdof_ctrl.files.tables import save_gain, save_response
 from halfdof_ctrl.systems.frequency import frequency_response
 
@@ -55,13 +55,13 @@ def test_numbers_of_a_row_that_contradict_each_other_are_refused(tmp_path: Path,
     """Omega and f, parts and magnitude and phase: a changed digit in any of them is found, in the order as saved."""
     path = tmp_path / "table.csv"
     model = mechss([[1.0]], [[1.0]], [[4.0]])
-    data = frequency_response(model, np.array([3.0, 1.0, 2.0, 2.0, 0.5]))
+    data = frequency_response(model, np.array([3.0, 2.0, 1.0, 0.5]))
     save_response(data, path)
     np.testing.assert_array_equal(load_response(path).omega, data.omega)
     table = cells(path)
-    table[2][column] = repr(float(table[2][column]) * 1.01)
+    table[3][column] = repr(float(table[3][column]) * 1.01)
     path.write_text("".join([",".join(row) + "\n" for row in table]))
-    with pytest.raises(FileFormatError, match="line 3: its numbers contradict each other"):
+    with pytest.raises(FileFormatError, match="line 4: its numbers contradict each other"):
         load_response(path)
 
 
@@ -105,4 +105,26 @@ def test_what_is_no_table_is_refused(tmp_path: Path, content: str, message: str)
     path = tmp_path / "table.csv"
     path.write_text(content)
     with pytest.raises(FileFormatError, match=message):
+        load_response(path)
+
+
+@pytest.mark.parametrize(
+    ("omega", "message"),
+    [
+        ([1.0, 2.0, 2.0, 3.0], "line 4: the same row as before"),
+        ([1.0, 3.0, 2.0, 4.0], "line 4: a frequency below the one before it, while others rise"),
+    ],
+)
+def test_rows_of_a_frequency_response_that_were_doubled_or_moved_are_told(
+    tmp_path: Path, omega: list[float], message: str
+) -> None:
+    """They come back as they stand, since such a response can be saved; one that falls throughout is as good."""
+    path = tmp_path / "table.csv"
+    data = frequency_response(mechss([[1.0]], [[1.0]], [[4.0]]), np.array(omega))
+    save_response(data, path)
+    with pytest.warns(ImportedModelWarning, match=message):
+        np.testing.assert_array_equal(load_response(path).omega, data.omega)
+    table = ["f [Hz],K' [N/m],K'' [N/m]", *[f"{value},{value + 9.0},1.0" for value in omega]]
+    path.write_text("\n".join(table) + "\n")
+    with pytest.warns(ImportedModelWarning, match=message):
         load_response(path)
