@@ -18,7 +18,7 @@ from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.stiffness_tables import frequency_column, is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
 
-AGREEMENT = 1e-6  #: relative; tables that went through a spreadsheet have lost digits
+ROW_AGREEMENT = 1e-6  #: relative; tables that went through a spreadsheet have lost digits
 MANY_STEPS, FEW_GAPS, LONG_STEP = 8, 2, 1.5  #: steps of time that tell what is usual, and longer ones that are not
 
 
@@ -188,7 +188,7 @@ def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatA
     with np.errstate(invalid="ignore"):
         sound = _close(values[0], 2.0 * np.pi * values[1]) & _close(np.abs(response), parts[:, :, 2]).all(axis=(0, 1))
         turned = parts[:, :, 2] * np.exp(1j * np.radians(parts[:, :, 3]))
-        off = np.abs(turned - response) > AGREEMENT * np.abs(response)
+        off = np.abs(turned - response) > ROW_AGREEMENT * np.abs(response)
     sound &= ~off.any(axis=(0, 1))
     if not sound.all():
         line = int(np.argmin(sound)) + 2
@@ -200,7 +200,7 @@ def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatA
 
 
 def _close(found: FloatArray, expected: FloatArray) -> npt.NDArray[np.bool_]:
-    return np.isclose(found, expected, rtol=AGREEMENT, atol=0.0, equal_nan=True)
+    return np.isclose(found, expected, rtol=ROW_AGREEMENT, atol=0.0, equal_nan=True)
 
 
 def _require_times(times: FloatArray, path: PathLike) -> None:

@@ -18,7 +18,7 @@ from halfdof_ctrl.files.formats.columns import cut_lines, whole_fields
 from halfdof_ctrl.files.formats.digits import known_to
 from halfdof_ctrl.files.formats.labels import dof_names
 from halfdof_ctrl.files.formats.raw_matrix import RawMatrix, assembled
-from halfdof_ctrl.files.formats.text_blocks import FIELD, number_rows, whole_numbers
+from halfdof_ctrl.files.formats.text_blocks import ANY_FIELD, number_rows, whole_numbers
 
 KIND_BY_ENDING = {".sti": "K", ".mas": "M"}  #: by the ending of the file
 DOFS = ".dof"
@@ -98,7 +98,7 @@ def _dofs_by_line(content: bytes) -> tuple[str, ...]:
     """Read the names one by one, with the line that is wrong."""
     nodes: list[int] = []
     components: list[int] = []
-    for line in FIELD.finditer(content):
+    for line in ANY_FIELD.finditer(content):
         match = LABEL.fullmatch(line[0])
         if match is None:
             raise _no_label(line[0], len(nodes) + 1)

@@ -27,7 +27,7 @@ TOO_SHORT = "lines are far shorter than their fields"
 MOST_GROWTH = 10  #: times that lines may grow when blanks at their ends are filled in,
 FREE_SPREAD = 2**20  #: beyond so many bytes
 LARGEST_WHOLE = 2.0**53  #: above it a float64 does not tell neighbouring integers apart
-FIELD = re.compile(rb"\S+")
+ANY_FIELD = re.compile(rb"\S+")
 ENDING_IN_EXPONENT = re.compile(rb"([0-9.])([+-][0-9]+)$")  #: Fortran drops the letter of an exponent of three digits
 
 
@@ -231,7 +231,7 @@ def _bad_row(text: bytes, columns: int, comment: str, first_line: int) -> FileFo
     """Find the first row that is wrong."""
     for number, whole in enumerate(text.split(b"\n"), start=first_line):
         row = whole.split(comment.encode(), 1)[0]
-        count = sum(1 for _ in FIELD.finditer(row))
+        count = sum(1 for _ in ANY_FIELD.finditer(row))
         if not count:
             continue
         shown = repr(whole[:60].decode("latin-1").strip())
