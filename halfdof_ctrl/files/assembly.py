@@ -233,7 +233,9 @@ def _compared(found: Sources, raws: Mapping[str, RawMatrix]) -> dict[str, RawMat
         other = written[first]
         if other is None or places is None or raws[letter].matrix.shape != raws[first].matrix.shape:
             continue
-        different = np.setxor1d(places, other, assume_unique=True)
+        if np.array_equal(places, other):  # in one order, as programs write them
+            continue
+        different = np.setxor1d(places, other)
         if different.size:
             row, column = divmod(int(different[0]), raws[letter].matrix.shape[0])
             doubt = (

@@ -74,7 +74,7 @@ def read_calculix(content: bytes, ending: str, most_rows: int) -> RawMatrix:
         format="CalculiX",
         letter=KIND_BY_ENDING[ending],
         known_to=known_to(content),
-        places=np.unique(places[:, 0] * size + places[:, 1]),
+        places=places[:, 0] * size + places[:, 1],
     )
 
 
