@@ -48,10 +48,11 @@ def abaqus(folder: Path, n: int) -> list[Path]:
 
 
 def calculix(folder: Path, n: int) -> list[Path]:
-    """Write row, column, value of the upper triangle, and the names of the rows."""
+    """Write row, column, value of the upper triangle, zeros of the mass too, and the names of the rows."""
     paths = []
-    for letter, (rows, columns, values) in chain(n):
-        paths.append(folder / f"job{'.sti' if letter == 'K' else '.mas'}")
+    (_, (rows, columns, stiffness)), _ = chain(n)
+    for ending, values in ((".sti", stiffness), (".mas", np.where(rows == columns, 1.5, 0.0))):
+        paths.append(folder / f"job{ending}")
         lines = [f"{j} {i} {v:20.13e}\n" for i, j, v in zip(rows, columns, values, strict=True)]
         paths[-1].write_text("".join(lines))
     (folder / "job.dof").write_text("".join([f"{node}.1\n" for node in range(1, n + 1)]))
