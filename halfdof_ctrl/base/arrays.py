@@ -30,6 +30,8 @@ SMALLEST_SIZE = 1e-152  #: of the largest entry of a column, so that the product
 LARGEST_SIZE = 1e154  #: of an entry, so that the product of two does not overflow
 SIGNAL_SIZES = (1e-200, 1e200)  #: the same of B, F and D, which enter a product but once
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
+EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of a matrix up to which they are of similar sizes
+FEW_ENTRIES = 400  #: of a matrix, up to which they are compared as plain numbers, which takes a microsecond
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -254,6 +256,21 @@ def unit_matrix(size: int) -> FloatArray:
 def powers_of_two(size: FloatArray) -> FloatArray:
     """Powers of two that bring sizes to between 1/2 and 1, and 1 for a zero."""
     return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
+
+
+def has_even_entries(matrix: FloatArray) -> bool:
+    """Return whether no entry of a matrix but zeros is tiny beside the largest.
+
+    Examples
+    --------
+    >>> [has_even_entries(np.array([[0.0, 1.0], [entry, -2.0]])) for entry in (-400.0, -1e12)]
+    [True, False]
+    """
+    if matrix.size <= FEW_ENTRIES:
+        sizes = [abs(entry) for entry in matrix.ravel("K").tolist() if entry]
+        return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
+    entries = np.abs(matrix[matrix != 0.0])
+    return not entries.size or bool(entries.max() <= EVEN_ENTRIES * entries.min())
 
 
 def is_complex(matrix: Matrix) -> bool:

@@ -20,6 +20,7 @@ from halfdof_ctrl.base.double_double import BITS, SPLITTER
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
+SMALL_MATRIX = 2500  #: entries of a matrix that is multiplied as it is
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
 
@@ -79,7 +80,9 @@ class ExactPolynomial:
         ----------
         s : complex or (k,) complex ndarray
             A point for all columns or one for each.
-        x, right : (n, k) complex ndarrays
+        x : (n, k) complex ndarray
+        right : (rows, k) complex ndarray
+            Of as many rows as P.
 
         Examples
         --------
@@ -89,7 +92,8 @@ class ExactPolynomial:
         >>> polynomial.residual(1.0, np.array([[1.0 + 0j]]), np.array([[1.0 + 0j]])).real.tolist()
         [[-1e-20]]
         """
-        total = _Sum(np.broadcast_to(np.asarray(right, dtype=np.complex128), x.shape))
+        rows = self.parts[0][2].first.shape[0]
+        total = _Sum(np.broadcast_to(np.asarray(right, dtype=np.complex128), (rows, x.shape[1])))
         points = np.broadcast_to(np.asarray(s, dtype=np.complex128), x.shape[1:])
         powers = [_Complex.of(x)]
         for power, unit, matrix in self.parts:
@@ -143,8 +147,9 @@ class _Complex:
 
 
 def as_it_is(matrix: FloatArray) -> Matrix:
-    """Return a dense matrix with few entries as a sparse one, whose residuals take less time."""
-    return csc_array(matrix) if np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size else matrix
+    """Return a large dense matrix with few entries as a sparse one, whose residuals take less time."""
+    few = matrix.size > SMALL_MATRIX and np.count_nonzero(matrix) < SPARSE_SHARE * matrix.size
+    return csc_array(matrix) if few else matrix
 
 
 def two_sum(a: FloatArray, b: FloatArray) -> Pair:

@@ -16,12 +16,10 @@ from scipy.linalg.lapack import dgebal
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.spectrum import balanced
-from halfdof_ctrl.reduction.method.loss import loss_points
+from halfdof_ctrl.reduction.method.loss_points import loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
-EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of A up to which balancing changes next to nothing
-EVALUATION_LOSS_FEW_ENTRIES = 400  #: of A, up to which they are compared as plain numbers, which takes a microsecond
 UNEVEN = 5e7  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
 EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
@@ -70,21 +68,6 @@ def warn_of_evaluation(sys: control.StateSpace, states: str, at_origin: int) -> 
         f"{CURES.get(states, 'The digits are kept by')} halfdof_ctrl.frequency_response."
     )
     give_warning(msg, LostDigitsWarning)
-
-
-def is_even(A: FloatArray) -> bool:
-    """Return whether the entries of a matrix are of so similar sizes that no evaluation needs to balance it.
-
-    Examples
-    --------
-    >>> is_even(np.array([[0.0, 1.0], [-400.0, -2.0]])), is_even(np.array([[0.0, 1.0], [-1e12, -2.0]]))
-    (True, False)
-    """
-    if A.size <= EVALUATION_LOSS_FEW_ENTRIES:
-        sizes = [abs(entry) for entry in A.ravel("K").tolist() if entry]
-        return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
-    entries = np.abs(A[A != 0.0])
-    return not entries.size or bool(entries.max() <= EVEN_ENTRIES * entries.min())
 
 
 def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLoss | None:

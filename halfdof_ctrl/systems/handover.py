@@ -3,10 +3,10 @@
 import control
 from scipy.linalg.lapack import dgetrf
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray, has_even_entries
 from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.systems.evaluation_loss import is_even, warn_of_evaluation
+from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
 from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
 from halfdof_ctrl.systems.state_map import States
 
@@ -35,7 +35,7 @@ def warn_of_python_control(model: SecondOrderModel, sys: control.StateSpace, sta
     free = free_motion_count(model.M, model.C, model.K) if len(model.dofs) <= FREE_MOTIONS_LARGEST else None
     if free is not None and states in ("dofs", "scaled") and warn_of_free_motions(sys, free):
         return
-    if not is_even(sys.A):
+    if not has_even_entries(sys.A):
         warn_of_evaluation(sys, states, at_origin=0 if free is None else free.poles)
 
 
@@ -50,7 +50,7 @@ def is_plain(A: FloatArray) -> bool:
     """
     if A.size == 0:
         return True
-    if not is_even(A):
+    if not has_even_entries(A):
         return False
     factors, _, _ = dgetrf(A)
     pivots = list(map(abs, factors.diagonal().tolist()))

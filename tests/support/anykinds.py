@@ -250,6 +250,16 @@ def in_units(model: SecondOrderModel, columns: FloatArray, rows: FloatArray, tau
     return mechss(P[2], P[1], P[0], B[0], *F[:2], H=F[2], D=D[0], Bv=B[1], Ba=B[2], Dv=D[1], Da=D[2])
 
 
+def nearly_singular(generator: np.random.Generator, structure: Structure) -> Structure:
+    """Move an entry of M by so little, 2^-20 to 2^-45, that where M was singular one of its values becomes that small.
+
+    The entries stay exact. The numbers as they are stored have states more for it, very fast ones.
+    """
+    M = structure.M.astype(float)
+    M[tuple(generator.integers(0, structure.size, 2))] += 2.0 ** -int(generator.integers(20, 46))
+    return Structure(structure.kind, M, structure.C, structure.K)  # type: ignore[arg-type]  # floats that act as integers
+
+
 @st.composite
 def drawn_models(
     draw: st.DrawFn, kinds: tuple[Kind, ...] = ANY_KIND, largest: int = 12

@@ -8,10 +8,14 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, unit_free_scaling
+from halfdof_ctrl.base.double_double import matrix_product
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, has_short_entries, least_rank
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, gap_threshold, unit_free_scaling
 
 RANK_TOLERANCE = 16 * EPS  #: times the block's size; singular values below are null
 ENTRY_NOISE = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
+SPECK = 4 * EPS  #: times the block's size: an entry of a vector of length one below that is rounding of a zero
+NULL_CORRECTIONS = 2  #: of null vectors, each by a residual in twice the working precision
 UNCLEAR_RANK = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
 
@@ -23,7 +27,9 @@ class BlockSplit:
     singular_values: FloatArray  #: of the scaled block, falling
     rank: int  #: how many of them count
     bound: float  #: those up to this one count as zero
-    noise: float  #: those up to this one may be what rounding of the entries makes of a zero
+    noise: (
+        float  #: those up to this one may be what rounding of the entries makes of a zero; 0 if they were not rounded
+    )
     mixing: FloatArray  #: (d, d) combinations, those that the block sees first; orthonormal but for `factors`
     factors: FloatArray  #: (d,) scale of the columns in which they are orthonormal
     spread: float  #: of the singular values that count, the largest over the smallest; 1 if none counts
@@ -51,18 +57,49 @@ def split_block(block: FloatArray, tol: float | None) -> BlockSplit:
         where others lie within 1e3 times that, those below the widest gap among them.
     """
     scaling = unit_free_scaling(block)
-    _, values, right = scipy.linalg.svd(scaling.of(block))
+    left, values, right = scipy.linalg.svd(scaling.of(block))
     bound = tol
     if bound is None:
         rounding = max(block.shape) * RANK_TOLERANCE
         bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR_RANK)
     rank = int(np.count_nonzero(values > bound * values[0]))
     spread = float(values[0] / values[rank - 1]) if rank else 1.0
-    speck = 4 * max(block.shape) * EPS * spread
-    clean = np.where(np.abs(right.T) <= speck, 0.0, right.T)  # what is rounding of zero is zero
-    noise = ENTRY_NOISE * max(block.shape) * float(values[0])
-    mixing = scaling.columns[:, None] * clean
+    speck = SPECK * max(block.shape)
+    noise = 0.0 if _hides_rank(block, rank) else ENTRY_NOISE * max(block.shape) * float(values[0])
+    seen = scaling.columns[:, None] * np.where(np.abs(right[:rank].T) <= speck * spread, 0.0, right[:rank].T)
+    null = _null_columns(block, scaling, (left[:, :rank], values[:rank], right), speck, spread)
+    mixing = np.hstack([seen, null])
     return BlockSplit(values, rank, float(bound * values[0]), noise, mixing, scaling.columns, spread)
+
+
+def _hides_rank(block: FloatArray, rank: int) -> bool:
+    """Return whether the entries of a small block were not rounded and have a higher rank than counts."""
+    if rank == min(block.shape) or max(block.shape) > LARGEST_EXACT or not has_short_entries(block):
+        return False
+    return least_rank(block) > rank
+
+
+def _null_columns(
+    block: FloatArray, scaling: Scaling, factors: tuple[FloatArray, FloatArray, FloatArray], speck: float, spread: float
+) -> FloatArray:
+    """Return a basis of the null space, as good as the entries of a block and not as the gap between its values.
+
+    Vectors of the decomposition are known to rounding times the spread of the values that count: beside a value of
+    1e-8, null vectors lean by 1e-8 to the one that belongs to it. What the block makes of them in twice the working
+    precision, divided by the values, takes that out. Entries that rounding so enlarged may have made of a zero are
+    zero, unless the block sees that.
+    """
+    left, values, right = factors
+    rank = values.size
+    null = scaling.columns[:, None] * right[rank:].T
+    for _ in range(NULL_CORRECTIONS if rank else 0):
+        rest = left.T @ (scaling.rows[:, None] * matrix_product(block, null)[0])
+        null = null - scaling.columns[:, None] * (right[:rank].T @ (rest / values[:, None]))
+    size = np.abs(null) / scaling.columns[:, None]
+    bare = np.where(size <= speck * spread, 0.0, null)
+    left_over = scaling.rows[:, None] * matrix_product(block, bare)[0]
+    harmless = np.linalg.norm(left_over, axis=0) <= speck * values.max(initial=0.0)
+    return np.asarray(np.where(harmless, bare, np.where(size <= speck, 0.0, null)))
 
 
 def lengths_of_columns(basis: FloatArray) -> FloatArray:

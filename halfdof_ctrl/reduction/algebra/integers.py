@@ -15,6 +15,9 @@ from halfdof_ctrl.base.arrays import FloatArray
 
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
+PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
+DIGITS = 53  #: binary ones of a double
+SPARE_DIGITS = 2  #: that are zero in a number that was not rounded
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
 
@@ -83,6 +86,87 @@ def log_determinant(matrix: IntegerArray) -> float:
     """
     size = abs(_eliminate(matrix.copy(), len(matrix)))
     return math.log(size) if size else -math.inf
+
+
+def least_rank(values: FloatArray) -> int:
+    """Return a rank that floating-point numbers have at least, and mostly have: that of their remainders by a prime.
+
+    Examples
+    --------
+    >>> least_rank(np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-50]])), least_rank(np.ones((2, 2)))
+    (2, 1)
+    """
+    work = np.asarray(as_integers(values)[0] % PRIME, dtype=np.int64)
+    rank = 0
+    for column in range(work.shape[1]):
+        found = np.flatnonzero(work[rank:, column])
+        if found.size == 0:
+            continue
+        work[[rank, rank + found[0]]] = work[[rank + found[0], rank]]
+        work[rank] = work[rank] * pow(int(work[rank, column]), -1, PRIME) % PRIME
+        below = work[rank + 1 :]
+        below -= np.outer(below[:, column], work[rank]) % PRIME
+        below %= PRIME
+        rank += 1
+        if rank == len(work):
+            break
+    return rank
+
+
+def degree_of_determinant(coefficients: FloatArray) -> int:
+    """Return the degree of ``det(P_0 + P_1 s + P_2 s^2)``, -1 if that vanishes at every s.
+
+    By remainders: the determinant at as many points as it may have coefficients, and their divided differences. The
+    degree is so large for certain; one chance in 10^8 or so has it that a higher one is missed.
+
+    Parameters
+    ----------
+    coefficients : (3, n, n) ndarray
+
+    Examples
+    --------
+    >>> degree_of_determinant(np.array([[[1.0, 1.0], [1.0, 1.0]], np.zeros((2, 2)), [[0.0, 0.0], [0.0, 2.0**-60]]]))
+    2
+    """
+    remainders = np.asarray(as_integers(coefficients)[0] % PRIME, dtype=np.int64)
+    most = (len(coefficients) - 1) * coefficients.shape[1]
+    points = np.arange(most + 1, dtype=np.int64)[:, None, None]
+    work = np.zeros((most + 1, *coefficients.shape[1:]), dtype=np.int64)
+    for part in remainders[::-1]:
+        work = (work * points + part) % PRIME
+    differences = _determinants(work)
+    for step in range(1, most + 1):
+        inverse = pow(step, -1, PRIME)
+        differences[step:] = (differences[step:] - differences[step - 1 : -1]) % PRIME * inverse % PRIME
+    found = np.flatnonzero(differences)
+    return int(found[-1]) if found.size else -1
+
+
+def _determinants(work: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """Return the remainders of the determinants of (k, n, n) remainders, which are overwritten."""
+    every, value = np.arange(len(work)), np.ones(len(work), dtype=np.int64)
+    for column in range(work.shape[1]):
+        place = column + (work[:, column:, column] != 0).argmax(axis=1)
+        pivot_rows = work[every, place]
+        work[every, place] = work[:, column]
+        value = np.where(place == column, value, -value) * pivot_rows[:, column] % PRIME
+        inverse = np.array([pow(pivot, -1, PRIME) if pivot else 0 for pivot in pivot_rows[:, column].tolist()])
+        factors = work[:, column + 1 :, column] * inverse[:, None] % PRIME
+        rest = work[:, column + 1 :, column + 1 :]
+        rest -= factors[:, :, None] * pivot_rows[:, None, column + 1 :] % PRIME
+        rest %= PRIME
+    return value
+
+
+def has_short_entries(values: FloatArray) -> bool:
+    """Return whether no entry of an array fills the digits of a double, as nearly all that were rounded do.
+
+    Examples
+    --------
+    >>> has_short_entries(np.array([[3.0, 1.0 + 2.0**-45]])), has_short_entries(np.array([[0.1, 3.0]]))
+    (True, False)
+    """
+    return not np.any(np.ldexp(np.frexp(values)[0], DIGITS - SPARE_DIGITS) % 1.0)
 
 
 def _eliminate(work: IntegerArray, n: int) -> int:

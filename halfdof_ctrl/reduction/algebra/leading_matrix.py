@@ -50,7 +50,7 @@ class LeadingMatrix:
         """
         enough = plainly_regular(len(W))
         if len(W) <= FEW_DOFS or not _is_uneven(W, enough):
-            factors, pivots, rcond = _lu_and_rcond(W)
+            factors, pivots, rcond = lu_and_rcond(W)
             if rcond >= enough:
                 kept = W if len(W) <= FEWEST_DOFS else None
                 return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=kept, rcond=rcond)
@@ -67,7 +67,7 @@ class LeadingMatrix:
     @classmethod
     def _scaled(cls, W: FloatArray, scaling: Scaling) -> "LeadingMatrix":
         scaled = scaling.of(W)
-        factors, pivots, rcond = _lu_and_rcond(scaled)
+        factors, pivots, rcond = lu_and_rcond(scaled)
         rows, columns = scaling
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, scaled=scaled, rcond=rcond)
 
@@ -146,7 +146,7 @@ def _is_uneven(W: FloatArray, enough: float) -> bool:
     return bool(size.min() < enough * size.max())
 
 
-def _lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
+def lu_and_rcond(matrix: FloatArray) -> tuple[FloatArray, npt.NDArray[np.int32], float]:
     """Factorize and estimate the reciprocal 1-norm condition number, 0 where a pivot vanishes."""
     norm = dlange("1", matrix)  # type: ignore[call-arg]  # the stubs lack its first argument
     factors, pivots, exact_zero = dgetrf(matrix)

@@ -10,12 +10,22 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, DenseMatrix, FloatArray, IndexArray, read_only, unit_matrix, zero_matrix
+from halfdof_ctrl.base.arrays import (
+    EPS,
+    ComplexArray,
+    DenseMatrix,
+    FloatArray,
+    IndexArray,
+    read_only,
+    unit_matrix,
+    zero_matrix,
+)
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilError, UncertainRankError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
 from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
@@ -25,10 +35,11 @@ from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
-from halfdof_ctrl.reduction.method.loss import Loss
+from halfdof_ctrl.reduction.method.loss import Loss, measured_loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_solver
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
@@ -80,6 +91,14 @@ class Deflation(FromEquations):
         """Return the decisions about blocks of J, equation (16)."""
         return self.evidence.decisions
 
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the response of all DOFs to forces."""
+        P = self.model.quadratics.P
+        speed = float(np.abs(states.points).max())
+        scaling = max_scaling(np.abs(P[0]) + np.abs(P[1]) * speed + np.abs(P[2]) * speed**2, even=2.0)
+        solve = pencil_solver([scaling.of(part) for part in P], states.points)
+        return np.asarray(scaling.columns[:, None] * solve(scaling.rows[:, None] * force))
+
     def inverse_rows(self) -> FloatArray:
         """Refuse: W is singular.
 
@@ -101,8 +120,10 @@ def by_deflation(model: SecondOrderModel, tol: float | None) -> Deflation:
     UncertainRankError
         No decision about ranks leads to state equations with the spectrum of P(s).
     """
-    found = deflated(model if tol is None else without_light_masses(model, tol), tol)
-    return found if found.model is model else replace(found, model=model)
+    if tol is not None:
+        return replace(deflated(without_light_masses(model, tol), tol), model=model)
+    found = deflated(model)
+    return replace(found, evidence=replace(found.evidence, loss=measured_loss(found)))
 
 
 def deflated(model: SecondOrderModel, tol: float | None = None) -> Deflation:

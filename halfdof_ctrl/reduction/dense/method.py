@@ -5,26 +5,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, has_even_entries
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, LeadingMatrix
-from halfdof_ctrl.reduction.algebra.scaling import max_scaling
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling, unit_free_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
-from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, loses_nothing, measured_loss
+from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal
 
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
+TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
+FEW_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LOSS_LOOKED_AT = 1e-12  #: other coordinates are tried only where that much is lost indeed, whatever the bound says
@@ -160,15 +164,36 @@ def _solved(model: SecondOrderModel, coordinates: DofPartition, *, asked: bool =
 def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolve:
     """Measure what is lost, and take other coordinates if these keep it.
 
-    Nothing worth a look is lost where the columns of a plainly regular W are those of M, C and K themselves.
+    Nothing worth a look is lost where the columns of a plainly regular W are those of M, C and K themselves and the
+    states are even.
     """
-    if tol is not None or (found.leading.is_plainly_regular and found.coordinates.basis is None):
+    if tol is not None or _loses_nothing(found):
         return found
     measured = replace(found, loss=measured_loss(found))
+    if measured.loss.value > ALLOWED_LOSS and _is_ordinary(found):
+        return replace(found, loss=measured_loss(found, allowed=TEN_TIMES_DATA))
     if asked or measured.loss.value < LOSS_LOOKED_AT:
         return measured
     better = _in_better_coordinates(found)
     return measured if better is None else replace(better, loss=measured_loss(better))
+
+
+def _loses_nothing(found: SingleSolve) -> bool:
+    part = found.coordinates
+    if not found.leading.is_plainly_regular or part.basis is not None:
+        return False
+    if len(found.A) <= FEW_STATES:
+        return loses_nothing(found.model, found.equations)
+    inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
+    inertial[part.order[: part.n_inertial]] = True
+    return not spread_is_wide(found.model, inertial)
+
+
+def _is_ordinary(found: SingleSolve) -> bool:
+    """Return whether M, C and K are those of an ordinary structure in odd units, which lets no more digits be lost."""
+    if not found.leading.is_plainly_regular or found.coordinates.basis is not None:
+        return False
+    return all(has_even_entries(unit_free_scaling(part).of(part)) for part in found.model.quadratics.P if part.any())
 
 
 def _in_better_coordinates(found: SingleSolve) -> SingleSolve | None:

@@ -6,12 +6,13 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import CloseDecisionWarning, LostDigitsWarning, NearlyMasslessWarning, give_warning
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.reduction.algebra.blocks import BlockSplit
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss
 
+ILL_CONDITIONED = 1e-3  #: reciprocal condition number of W below which that is the cause of a loss
 CLOSE_GAP = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 ALLOWED_LOSS = 1e-9  #: against a direct solve: above it other ways are tried, and what is kept is warned of
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
@@ -85,6 +86,11 @@ class Evidence:
     hardly: bool = False  #: whether rcond is near rounding, so that the number of states rests on it
     altered: bool = False  #: whether `tol` made a state space that has another spectrum than the model, (19)
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a decision took as zero what is more than rounding, which is warned of."""
+        return any(decision.is_doubtful for decision in self.decisions)
+
     def warn(self, tol: float | None) -> None:
         """Warn of everything that a user must know.
 
@@ -122,10 +128,16 @@ def _warn_of_hardly_regular(rcond: float) -> None:
 def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
     """Warn where what is stored loses more than 1e-9 of a channel."""
     if loss.value > ALLOWED_LOSS:
+        cause = (
+            f"the equations for the highest derivatives are ill conditioned (reciprocal condition number {rcond:.1e})"
+            if rcond < ILL_CONDITIONED
+            else "some states are far faster than others, as DOFs with hardly any mass or damping make them"
+        )
         msg = (
-            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.value:.1e} of the "
-            f"transfer function, at {loss.omega:.3g} rad/s: the equations for the highest derivatives are ill "
-            f"conditioned (reciprocal condition number {rcond:.1e}). descriptor_response keeps the digits."
+            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.value:.1e} of "
+            f"{loss.output} from {loss.source} at {loss.omega:.3g} rad/s: terms cancel in them that are "
+            f"{loss.value / EPS:.0e} times as large as what they leave, since {cause}. "
+            "descriptor_response keeps the digits."
         )
         give_warning(msg, LostDigitsWarning)
 
@@ -143,9 +155,14 @@ def _warn_of_close_decisions(evidence: tuple[RankDecision, ...]) -> None:
             )
             give_warning(msg, CloseDecisionWarning)
         elif decision.is_doubtful:
+            known = (
+                f"rounding of its entries explains {decision.noise:.1e}"
+                if decision.noise
+                else "its entries have so few digits that they were not rounded"
+            )
             msg = (
                 f"A block of {decision.matrix} counts as rank {rank}: its next singular value, {values[rank]:.1e} of "
-                f"{values[0]:.1e}, is taken as zero, though rounding of its entries explains {decision.noise:.1e}. "
+                f"{values[0]:.1e}, is taken as zero, though {known}. "
                 f"It concerns DOFs {listed(decision.dofs)}: the numbers as they are stored have one state or two more, "
                 "very fast ones. Pass tol to say what counts as zero, or mend entries that should cancel."
             )

@@ -1,50 +1,63 @@
 """What the stored A, B, C, D lose against M, C, K, measured at the frequencies where it shows.
 
-Let x be the response of the stored system at s, known to the last digit, and q what it says of all DOFs. Had A and B no
-rounding errors, q would satisfy the equation of motion. What is left of that,
+Two responses are compared, each known beyond the last digit: that of the stored numbers, and that of the model. For the
+latter, motions q that are nearly right are put into the equation of motion. What is left of that,
 
     r = B(s) - P(s) q,                                                                     (29)
 
-is a force, and the response to it is what is lost, to first order in the loss: H = F(s) (q + P(s)^-1 r) + D(s), beside
-what C and D say. Both x and the residual (29) are summed in twice the working precision, since what is looked for is
-smaller than the rounding of either; of P(s)^-1 r the first digit counts. Derivation: docs/explanation/evaluation.md.
+is a force, and the response to it is what q lacks: H = F(s) (q + P(s)^-1 r) + D(s). Residuals and outputs are summed in
+twice the working precision, in units in which equations, DOFs and states are of one size, since what is looked for is
+smaller than the rounding of any of them; of P(s)^-1 r the first digit counts. Derivation:
+docs/explanation/evaluation.md.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from dataclasses import dataclass, fields
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
-import scipy.linalg
-from scipy.linalg.lapack import dgetrf, zgetrf
-from scipy.sparse import csc_array
-from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
+from scipy.linalg.lapack import dgetrs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix
-from halfdof_ctrl.base.exact_products import ExactPolynomial
-from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix, has_even_entries, powers_of_two
+from halfdof_ctrl.base.exact_products import as_it_is
+from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling_with_time, max_scaling
+from halfdof_ctrl.reduction.method.loss_points import BESIDE_MODE, loss_points
+from halfdof_ctrl.reduction.method.masses import slowest_speed
+from halfdof_ctrl.reduction.method.refined_answers import (
+    Equations,
+    Response,
+    Solver,
+    StateSolver,
+    pencil_solver,
+    refined_response,
+    sizes_of_terms,
+)
+from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
-ALL_EIGENVALUES = 60  #: up to which all eigenvalues are computed to choose the frequencies
-SLOW_MODES = 6  #: of more states, that are looked for
-SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
-MOST_FREQUENCIES = 4  #: frequencies at which the loss is measured
+TYPICAL_POINTS = (0.2j, 0.55j, 1.6j, 4.4j)  #: looked at in a model of few DOFs as well, in units of its time scale
+ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
+SLOWEST = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
-AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
-BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are looked for if A is singular
+SHALLOW = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
-ZERO_CHANNEL = 100.0  #: times what these change in it: a smaller channel is zero
-LOSS_SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
+UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
+ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
+SMALL_CHANNEL = 1e-6  #: of the motions that it shows: only a smaller channel can be zero but for rounding of M, C, K
+EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels, up to which few states lose nothing
 
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """How much of a channel's largest value is lost, where that is most."""
+    """How much of a channel's value is lost, where that is most."""
 
     value: float = 0.0
     omega: float = float("nan")  #: [rad/s]
+    output: str = ""  #: name of the output ...
+    source: str = ""  #: ... and of the input
 
 
 NOTHING_LOST = Loss()
@@ -68,184 +81,211 @@ class Stored(Protocol):
     def output(self, model: SecondOrderModel) -> Signal:
         """Return the outputs of a model that differs in them alone."""
 
-    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
-        """Return all DOFs, (n, k), for states (N, k) and inputs and their derivatives (m, k)."""
-
-    def answer(self, states: "StateSolver", force: ComplexArray) -> ComplexArray:
+    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         """Return the response of all DOFs, (n, k), to forces (n, k), to a digit or two."""
 
 
-def measured_loss(stored: Stored) -> Loss:
-    """Measure what A, B, C, D lose, relative to each channel's largest value at the frequencies that are looked at."""
-    m = stored.B.shape[1]
-    chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
-    equation, output = equation_of_motion(stored.model), stored.output(stored.model)
-    points, lost, values, undetermined = [], [], [], []
-    for s in loss_points(stored.A):
-        try:
-            error, value, data = _lost_at(stored, equation, output, s, chosen)
-        except np.linalg.LinAlgError:  # an eigenvalue, at which nothing is determined
-            continue
-        points.append(float(abs(s)))
-        lost.append(error)
-        values.append(value)
-        undetermined.append(data)
-    if not lost:
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """What k inputs do in p outputs at some points, (points, p, k) each."""
+
+    missed: FloatArray  #: size of what is lost
+    value: FloatArray  #: size of the value
+    rounding: FloatArray  #: below which the value is zero
+    moved: FloatArray  #: what rounding of M, C, K at random changes in it
+    grown: FloatArray  #: size of the part of it that grows with frequency
+
+
+def loses_nothing(model: SecondOrderModel, equations: StateEquations) -> bool:
+    """Tell at once whether few states, of a plainly regular W, lose nothing that is worth a look.
+
+    A is far from singular, as it stands or once its states are of one size and if no entry of M, C and K of few DOFs is
+    tiny beside the others of its matrix; and what static DOFs have of the states and of the inputs does not cancel.
+
+    Examples
+    --------
+    A mass on a spring, and one of which nearly nothing is left:
+
+    >>> from halfdof_ctrl import exact_reduction, mechss
+    >>> [loses_nothing(model, exact_reduction(model).solution.equations)
+    ...  for model in (mechss([[1]], [[0.1]], [[4]]), mechss([[1e-9]], [[0.1]], [[4]]))]
+    [True, False]
+    """
+    A, scale, q = equations.A, None, equations.displacement
+    if not len(A) or equations.shift:
+        return not len(A)
+    factors, pivots, rcond = lu_and_rcond(A)
+    if EVEN_STATES * rcond < 1.0:  # in these units at least
+        if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part) for part in model.quadratics.P):
+            return False
+        A, scale = balanced_states(A)
+        factors, pivots, rcond = lu_and_rcond(A)
+    if EVEN_STATES * rcond < 1.0 or not q.U:
+        return EVEN_STATES * rcond >= 1.0
+    x = dgetrs(factors, pivots, equations.B if scale is None else equations.B / scale[:, None])[0]
+    x = x if scale is None else x * scale[:, None]
+    terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
+    left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
+    return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
+
+
+def measured_loss(stored: Stored, allowed: float = 0.0) -> Loss:
+    """Measure what A, B, C, D lose, relative to each channel's value at the frequencies that are looked at.
+
+    Relative to a thousandth of what the channel is at some lower frequency, or to its part that grows with frequency
+    and is in no state space, where these are larger. What is at most `allowed` times what rounding of M, C and K at
+    random changes is none.
+    """
+    comparison = _Comparison.of(stored)
+    points = comparison.points
+    groups = [points] if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
+    found = [part for group in groups for part in comparison.tried(group)]
+    if not found:
         return NOTHING_LOST
-    largest = np.broadcast_to(np.max(values, axis=0), np.shape(lost))
-    seen = largest > np.maximum(np.max(undetermined, axis=0), _rounding_of_zeros(largest[0]))
-    relative = np.divide(lost, largest, out=np.zeros(largest.shape), where=seen)
-    worst = np.unravel_index(int(relative.argmax()), relative.shape)
-    return Loss(float(relative[worst]), points[int(worst[0])])
+    at = np.concatenate([where for where, _ in found])
+    order = np.argsort(np.abs(at), kind="stable")
+    at = at[order]
+    missed, value, rounding, moved, grown = (
+        np.concatenate([getattr(part, what.name) for _, part in found])[order] for what in fields(_Measured)
+    )
+    missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
+    value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
+    size = np.maximum(np.maximum(value, grown), SHALLOW * np.maximum.accumulate(value, axis=0))
+    relative = np.divide(missed, size, out=np.zeros(size.shape), where=value > 0.0)
+    if not relative.size:
+        return NOTHING_LOST
+    worst = np.unravel_index(int(np.nan_to_num(relative, nan=np.inf).argmax()), relative.shape)
+    k, i, j = (int(place) for place in worst)
+    return Loss(
+        float(np.nan_to_num(relative[k, i, j], nan=np.inf)),
+        float(abs(at[k])),
+        stored.model.outputs[i],
+        stored.model.inputs[int(comparison.chosen[j])],
+    )
 
 
-def _rounding_of_zeros(largest: FloatArray) -> FloatArray:
-    """Return below which size a channel is zero but for rounding, in units that rows and columns have."""
-    rows = largest.max(axis=1, keepdims=True)
-    across = np.divide(largest, rows, out=np.zeros_like(largest), where=rows > 0.0).max(axis=0)
+def _rounding_of_zeros(value: FloatArray) -> FloatArray:
+    """Return below which size a channel is zero but for rounding at each point, in units of rows and columns."""
+    rows = value.max(axis=2, keepdims=True)
+    across = np.divide(value, rows, out=np.zeros_like(value), where=rows > 0.0).max(axis=1, keepdims=True)
     return np.asarray(ZERO_CHANNEL * EPS * rows * across)
 
 
-def equation_of_motion(model: SecondOrderModel) -> ExactPolynomial:
-    """Return P(s) = K + C s + M s^2 for residuals in twice the working precision."""
-    return ExactPolynomial([_as_it_is(matrix) for matrix in model.quadratics.P])
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Comparison:
+    """A model and its stored state space in even units, for chosen inputs."""
+
+    stored: Stored
+    points: ComplexArray
+    scaling: Scaling  #: of the equations of motion
+    motion: Equations  #: of the model, scaled
+    states: Equations  #: of the state space, balanced
+    chosen: IndexArray  #: which inputs
+
+    @classmethod
+    def of(cls, stored: Stored) -> "_Comparison":
+        model, m, N = stored.model, stored.B.shape[1], len(stored.A)
+        chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
+        points = loss_points(stored.A) if N else np.zeros(0, dtype=np.complex128)
+        speed = float(np.median(np.abs(points))) if N else 1.0
+        if len(model.dofs) <= FEW_DOFS:
+            speeds = _typical_speeds(model)
+            typical = [slowest_speed(model) * BESIDE_MODE * 1j, *np.outer(speeds, TYPICAL_POINTS).ravel().tolist()]
+            points = np.concatenate([points[np.abs(points) > SLOWEST * min(speeds)], np.asarray(typical)])
+            speed = speeds[-1]
+        rows, columns = scaling = max_scaling(_terms(model.quadratics.P, speed), even=2.0)
+        B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
+        inputs = powers_of_two(np.asarray(_terms(B, speed)).max(axis=0, initial=0.0))
+        motion = Equations(
+            R=[_scaled(part, rows, columns) for part in model.quadratics.P],
+            B=[part * inputs for part in B],
+            C=[_scaled(part, np.ones(part.shape[0]), columns) for part in model.quadratics.F],
+            D=[part * inputs for part in _columns(model.quadratics.D, chosen)],
+        )
+        (A, scale), output = balanced_states(stored.A), stored.output(model)
+        into = stored.B[:, chosen] * inputs / scale[:, None]
+        direct = [part[:, chosen] * inputs for part in output.U] or [np.zeros((len(output.X), chosen.size))]
+        states = Equations(
+            R=[as_it_is(-A), as_it_is(np.eye(N))],
+            B=[into, np.zeros_like(into)],
+            C=[output.X * scale, *[np.zeros_like(output.X) for _ in direct[1:]]],
+            D=direct,
+        )
+        return cls(stored=stored, points=points, scaling=scaling, motion=motion, states=states, chosen=chosen)
+
+    @property
+    def is_small(self) -> bool:
+        """Whether all points are looked at together, by factors of P(s) itself."""
+        return len(self.stored.model.dofs) <= FEW_DOFS
+
+    def tried(self, points: ComplexArray) -> list[tuple[ComplexArray, _Measured]]:
+        """Compare at some points but those that are eigenvalues, at which nothing is determined."""
+        try:
+            return [(points, self.at(points))]
+        except np.linalg.LinAlgError:
+            single = [points[k : k + 1] for k in range(points.size)] if points.size > 1 else []
+            return [found for point in single for found in self.tried(point)]
+
+    def at(self, points: ComplexArray) -> _Measured:
+        """Compare at some points."""
+        solver = StateSolver(self.stored.A, points)
+        answer: Solver = pencil_solver(self.motion.R, points) if self.is_small else partial(self._answer, solver)
+        s = np.repeat(points, self.chosen.size)
+        u = np.tile(np.eye(self.chosen.size, dtype=np.complex128), points.size)
+        said = refined_response(self.states, solver.balanced_solve, s, u)
+        true = refined_response(self.motion, answer, s, u)
+        rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
+        moved = self._undetermined(answer, s, true)
+        small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
+        rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
+        shape = (len(value), points.size, self.chosen.size)
+        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], s, u)
+        missed = np.abs(true.y - said.y)
+        missed = np.where(missed > UNSETTLED * (true.rounding + said.rounding), missed, 0.0)
+        parts = (missed, value, rounding, moved, grown)
+        return _Measured(*[np.moveaxis(part.reshape(shape), 1, 0) for part in parts])
+
+    def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        """Return the answer of all DOFs in the scaled units."""
+        rows, columns = self.scaling
+        return np.asarray(self.stored.answer(states, force / rows[:, None]) / columns[:, None])
+
+    def _undetermined(self, answer: Solver, s: ComplexArray, true: Response) -> FloatArray:
+        """Return what rounding of M, C, K at random changes in the outputs."""
+        terms, generator = sizes_of_terms(self.motion.R, s, true.x), np.random.default_rng(0)
+        forces = [EPS * terms * generator.uniform(-1.0, 1.0, terms.shape) for _ in range(TRIED_ROUNDINGS)]
+        changes = [np.abs(self.motion.seen(s, answer(force.astype(np.complex128)))) for force in forces]
+        return np.asarray(np.max(changes, axis=0))
 
 
-def loss_points(A: FloatArray) -> ComplexArray:
-    """Choose points on the imaginary axis: beside the slowest oscillations and at the slowest real pole."""
-    poles, bounds = _slow_eigenvalues(A)
-    moving = poles[np.abs(poles) > bounds]
-    moving = moving[np.argsort(np.abs(moving))]
-    swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
-    chosen = np.concatenate([swinging[: MOST_FREQUENCIES - 1], real[:1]])
-    return np.asarray(1j * BESIDE_MODE * (chosen if chosen.size else np.ones(1)))
+def _typical_speeds(model: SecondOrderModel) -> list[float]:
+    """Return the typical frequency of a model of few DOFs, and that of its springs and dampers, where that is another.
 
-
-def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
-    """Return all eigenvalues of a small matrix or the smallest ones, and up to which size they may be zero."""
-    N = len(A)
-    if N <= ALL_EIGENVALUES:
-        poles, rounding = eigenvalues_and_rounding(A)
-        return poles, rounding + AT_ORIGIN * np.abs(poles).max(initial=0.0)
-    matrix, _ = balanced_states(A)
-    factors, shift = dgetrf(matrix)[:2], 0.0  # says nothing of free motions, which are looked after below
-    pivots = np.abs(np.diag(factors[0]))
-    if pivots.min() <= N * EPS * pivots.max():  # free motions: look beside zero
-        shift = -BESIDE_ZERO * float(np.exp(np.log(np.maximum(pivots, EPS * pivots.max())).mean()))
-        factors = dgetrf(matrix - shift * np.eye(N))[:2]
-    inverse = LinearOperator(
-        (N, N), matvec=lambda v: scipy.linalg.lu_solve(factors, v, check_finite=False), dtype=np.float64
-    )
-    start = np.random.default_rng(0).standard_normal(N)
-    try:
-        found = eigs(inverse, k=SLOW_MODES, v0=start, tol=SLOW_MODES_ACCURACY, return_eigenvectors=False)
-    except ArpackNoConvergence as some:
-        found = np.asarray(some.eigenvalues)
-    except ArpackError:
-        found = np.zeros(0, dtype=complex)
-    poles = np.asarray(shift + 1.0 / found[found != 0.0], dtype=np.complex128)
-    return poles, np.full(
-        poles.size, (AT_ORIGIN if shift == 0.0 else SLOW_MODES_ACCURACY) * np.abs(poles).max(initial=0.0)
-    )
-
-
-def _lost_at(
-    stored: Stored, equation: ExactPolynomial, output: Signal, s: complex, chosen: IndexArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the size of what is lost, of the value, and below which it is zero, (p, k) each, for k chosen inputs."""
-    model = stored.model
-    states = StateSolver(stored.A, s)
-    x = states.solve_exactly(stored.B[:, chosen].astype(np.complex128))
-    unit = np.eye(stored.B.shape[1])[:, chosen]
-    powers = [s**power for power in range(max(3, len(output.U)))]
-    q = np.empty((len(model.dofs), chosen.size), dtype=np.complex128)
-    q.real = stored.motion_at(x.real.copy(), [power.real * unit for power in powers], 0)
-    q.imag = stored.motion_at(x.imag.copy(), [power.imag * unit for power in powers], 0)
-    rest = equation.residual(s, q, _at(model.quadratics.B, s, chosen))
-    value = _at(model.quadratics.D, s, chosen) + _seen(model, s, q)
-    said = np.asarray(output.X @ x)
-    for power, part in zip(powers, output.U, strict=False):
-        said = said + power * part[:, chosen]
-    missed = np.asarray(value - said + _seen(model, s, stored.answer(states, rest)))
-    terms = sum(abs(s) ** power * (abs(matrix) @ np.abs(q)) for power, matrix in enumerate(model.quadratics.P))
-    generator = np.random.default_rng(0)
-    rounded = [EPS * terms * generator.uniform(-1.0, 1.0, q.shape) for _ in range(TRIED_ROUNDINGS)]
-    data = [np.abs(_seen(model, s, stored.answer(states, force.astype(np.complex128)))) for force in rounded]
-    return np.abs(missed), np.abs(value), ZERO_CHANNEL * np.max(data, axis=0)
-
-
-class StateSolver:
-    """``(s I - A)^-1``, factorized; where k states are derivatives of others, with k rows and columns less.
-
-    With ``A = [0 E; P R]``, E diagonal, of the k first rows ``E v = s p - b`` follows, and
-
-        (s - R) v - P p = c   is   ((s - R) E^-1 s - P) p = c + (s - R) E^-1 b.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        s is an eigenvalue.
+    A single mass that is tiny makes the first one very large, though what moves without it is as slow as before.
     """
-
-    def __init__(self, A: FloatArray, s: complex) -> None:
-        self.s = s
-        self.matrix, self.scale = balanced_states(A)
-        N = len(A)
-        self.k = k = _derivatives(self.matrix)
-        self.rates = np.diagonal(self.matrix[:k, N - k :])[:, None].copy()
-        lower = s * np.eye(N)[k:] - self.matrix[k:]
-        self.onto = lower[:, N - k :] / self.rates.T
-        reduced = lower[:, : N - k].copy()
-        reduced[:, :k] += s * self.onto
-        self.factors = zgetrf(reduced)[:2] if N else None
-        if self.factors is not None and not np.abs(np.diag(self.factors[0])).min() > 0.0:
-            msg = "s is an eigenvalue"
-            raise np.linalg.LinAlgError(msg)
-
-    def solve(self, right: ComplexArray) -> ComplexArray:
-        """Return ``(s I - A)^-1 right`` for an (N, k) array."""
-        return np.asarray(self.scale[:, None] * self._solved(right / self.scale[:, None]))
-
-    def solve_exactly(self, right: ComplexArray) -> ComplexArray:
-        """Correct it once by a residual in twice the working precision."""
-        scaled = right / self.scale[:, None]
-        exact = ExactPolynomial([_as_it_is(-self.matrix), _as_it_is(np.eye(len(self.matrix)))])
-        x = self._solved(scaled)
-        return np.asarray(self.scale[:, None] * (x + self._solved(exact.residual(self.s, x, scaled))))
-
-    def _solved(self, right: ComplexArray) -> ComplexArray:
-        if self.factors is None:
-            return right
-        upper, k = right[: self.k], self.k
-        first = scipy.linalg.lu_solve(self.factors, right[k:] + self.onto @ upper, check_finite=False)
-        return np.concatenate([first, (self.s * first[:k] - upper) / self.rates])
+    K, C, M = (model.as_dense() if model.is_sparse else model).quadratics.P
+    logs = [log_scaling_with_time(np.stack([K, C, M]))[2]]
+    if K.any() and C.any():
+        slow = log_scaling_with_time(np.stack([K, C]))[2]
+        logs += [slow] if abs(slow - logs[0]) > ANOTHER_SCALE else []
+    return [float(np.exp2(log)) for log in logs]
 
 
-def _derivatives(A: FloatArray) -> int:
-    """Count the first states whose derivatives are last states, but for a factor."""
-    N = len(A)
-    for k in range(N // 2, 0, -1):
-        block = A[:k, N - k :]
-        if np.count_nonzero(A[:k]) == k and np.diagonal(block).all():
-            return k
-    return 0
+def _terms(coefficients: Sequence[Matrix], speed: float) -> Any:  # noqa: ANN401  # a matrix of the kind that is given
+    """Return ``|K| + |C| speed + |M| speed^2``."""
+    parts: list[Any] = list(coefficients)
+    total = abs(parts[0])
+    for k, part in enumerate(parts[1:], 1):
+        total = total + abs(part) * speed**k
+    return total
 
 
-def _seen(model: SecondOrderModel, s: complex, q: ComplexArray) -> ComplexArray:
-    """Return ``F(s) q``."""
-    parts = [s**power * np.asarray(part @ q) for power, part in enumerate(model.quadratics.F)]
-    return np.asarray(parts[0] + parts[1] + parts[2])
+def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:
+    """Return columns of a polynomial's coefficients, dense."""
+    parts = [part[:, chosen] for part in coefficients]
+    return [np.asarray(part if isinstance(part, np.ndarray) else part.toarray()) for part in parts]
 
 
-def _at(coefficients: Sequence[Matrix], s: complex, columns: IndexArray) -> ComplexArray:
-    """Return columns of a polynomial at s, dense."""
-    parts = [part[:, columns] for part in coefficients]
-    return np.asarray(
-        sum(s**k * (part if isinstance(part, np.ndarray) else part.toarray()) for k, part in enumerate(parts))
-    )
-
-
-def _as_it_is(matrix: Matrix) -> Matrix:
-    """Return a dense matrix with few entries as a sparse one."""
-    few = isinstance(matrix, np.ndarray) and np.count_nonzero(matrix) < LOSS_SPARSE_SHARE * matrix.size
-    return csc_array(matrix) if few else matrix
+def _scaled(matrix: Matrix, rows: FloatArray, columns: FloatArray) -> Matrix:
+    scaling = Scaling(rows, columns)
+    return as_it_is(scaling.of(matrix)) if isinstance(matrix, np.ndarray) else scaling.of_sparse(matrix)

@@ -18,8 +18,9 @@ from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.algebra.leading_matrix import plainly_regular
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
-from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, StateSolver, measured_loss
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, measured_loss
 from halfdof_ctrl.reduction.method.protocol import MethodName
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver
 from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement

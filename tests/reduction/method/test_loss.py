@@ -1,11 +1,33 @@
-"""What the measurement of the loss itself does with states that do not move."""
+"""What is measured of the loss: as much as exact arithmetic says, and nothing of states that do not move."""
 
 import warnings
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
 
-from halfdof_ctrl.reduction.method.loss import StateSolver, loss_points
+from halfdof_ctrl import exact_reduction, mechss
+from halfdof_ctrl.base.errors import CloseDecisionWarning, HalfdofWarning, LostDigitsWarning, UncertainRankError
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.method.loss_points import loss_points
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver
+from support.anykinds import Kind, in_units, massless_nodes, mixed, nearly_singular, signals
+from support.beams import cantilever
+from support.rational import rational_transfer
+from support.structures import assembly, gyroscopic, null_columns, rank_deficient
+from support.verdict import Improved
+
+SIZE = 1.5  # what is lost is measured to a digit
+LOSING: tuple[tuple[Kind, int, int], ...] = (  # kinds, sizes and seeds of `hunt.py --near`, by each of the methods
+    (null_columns, 5, 2),
+    (assembly, 2, 65),
+    (gyroscopic, 4, 84),
+    (massless_nodes, 4, 25),
+    (rank_deficient, 3, 195),
+    (mixed, 2, 207),
+    (mixed, 4, 31),
+    (mixed, 5, 143),
+)
 
 
 def test_a_point_that_is_an_eigenvalue_is_an_error_and_no_warning_of_another_package() -> None:
@@ -25,3 +47,70 @@ def test_free_motions_of_many_states_are_no_points_and_no_warnings() -> None:
         warnings.simplefilter("error")
         points = np.abs(loss_points(A))
     assert np.min(np.abs(points - 2.0)) < 0.02
+
+
+def lost(model: SecondOrderModel) -> tuple[float, float]:
+    """Give what is said to be lost of a channel, and what exact arithmetic says of it at that frequency."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", HalfdofWarning)
+        reduction = exact_reduction(model)
+    loss, output = reduction.solution.evidence.loss, reduction.output
+    stored = Improved(reduction.A, reduction.B, output.X, output.direct(len(model.inputs)), output.U[1:])
+    channel = model.outputs.index(loss.output), model.inputs.index(loss.source), 0
+    exact = rational_transfer(model).at(1j * loss.omega)[channel]
+    grown = sum(abs(part[channel[:2]]) * loss.omega**k for k, part in enumerate(output.U[1:], 1))
+    return loss.value, abs(stored.exactly_at(1j * loss.omega)[channel] - exact) / max(abs(exact), grown)
+
+
+@pytest.mark.parametrize(("kind", "size", "seed"), LOSING)
+@pytest.mark.parametrize("odd_units", [False, True])
+def test_what_is_lost_is_what_exact_arithmetic_says(kind: Kind, size: int, seed: int, odd_units: bool) -> None:  # noqa: FBT001
+    """Against 600 bits, for the stored numbers and for M, C, K, at the frequency and in the channel that are named."""
+    generator = np.random.default_rng([seed, size])
+    model = signals(generator, nearly_singular(generator, kind(generator, size)))
+    columns, rows = 8.0 ** np.arange(-4, 4)[:size], 8.0 ** np.arange(3, -5, -1)[:size]
+    measured, exact = lost(in_units(model, columns, rows, 8.0**5) if odd_units else model)
+    assert measured > 1e-9
+    assert_allclose(measured, exact, rtol=SIZE - 1.0)
+
+
+def test_the_warning_names_the_channel_the_size_and_the_cause() -> None:
+    """Two DOFs that move together but for a mass of 3e-9: W looks sound, what follows from it is not."""
+    generator = np.random.default_rng([65, 2])
+    model = signals(generator, nearly_singular(generator, assembly(generator, 2)))
+    said = r"lose \d\.\de-\d\d of y\[\d\] from u\[\d\] at .* far faster than others"
+    with pytest.warns(LostDigitsWarning, match=said):
+        exact_reduction(model)
+
+
+@pytest.mark.parametrize("power", [26, 27, 30, 33, 36])
+def test_null_vectors_beside_a_small_mass_are_as_good_as_the_entries(power: int) -> None:
+    """A mass that three DOFs share but for a part of 2^-power: nothing of any channel is lost, and no word said."""
+    M = np.ones((3, 3))
+    M[2, 2] += 2.0**-power
+    model = mechss(M, np.diag([3, 1, 2]), [[15, -5, -5], [-5, 10, -2], [-5, -2, 18]])
+    reduction, points = exact_reduction(model), np.array([0.3j, 1.4j, 5j, 100j])
+    stored = Improved(reduction.A, reduction.B, reduction.output.X, reduction.output.direct(3))
+    assert_allclose(stored.exactly_at(points), rational_transfer(model).at(points), rtol=1e-13)
+
+
+def test_a_beam_loses_no_more_than_its_entries_leave_open() -> None:
+    """Rounding of M and K changes as much of a cantilever's response as A, B, C and D lose: no fault of theirs."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LostDigitsWarning)
+        exact_reduction(cantilever(20))
+
+
+def test_states_that_rank_decisions_hide_are_told() -> None:
+    """A mass of 2^-44 beside a zero: the entries are no rounded ones, so they have a state more than is given."""
+    M = np.array([[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 3.0]])
+    M[0, 0] += 2.0**-44
+    with pytest.warns(CloseDecisionWarning, match="so few digits that they were not rounded"):
+        assert exact_reduction(mechss(M, np.diag([1, 2, 1]), [[15, -5, -5], [-5, 10, -2], [-5, -2, 18]])).order == 5
+
+
+def test_a_pencil_that_is_regular_by_a_last_digit_is_not_called_singular() -> None:
+    """Two DOFs with one mass and one spring but for a part of 2^-50: exactly 4 states, to working precision any."""
+    mass = np.array([[1.0, 1.0], [1.0, 1.0]])
+    with pytest.raises(UncertainRankError, match="stored have 2 finite eigenvalues"):
+        exact_reduction(mechss(mass, None, mass + np.diag([0.0, 2.0**-50])))

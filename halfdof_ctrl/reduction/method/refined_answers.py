@@ -1,0 +1,189 @@
+"""Solutions of (s I - A) x = b and P(s) q = f at several points s, and their corrections beyond the last digit.
+
+Columns of a right-hand side belong to the points in turn: first all of the first point, then all of the second.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from scipy.linalg.lapack import zgetrf, zgetrs
+from scipy.sparse import csc_array, diags_array, hstack
+
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
+from halfdof_ctrl.base.spectrum import balanced_states
+
+Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
+
+MOST_CORRECTIONS = 4  #: of a solution
+CORRECTED = 1e-22  #: of what is seen: a smaller correction is the last one
+LAST_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Equations:
+    """``R(s) x = B(s) u`` and ``y = C(s) x + D(s) u``, for n unknowns, m inputs and p outputs: coefficients of s^k."""
+
+    R: Sequence[Matrix]  #: (n, n) each
+    B: Sequence[FloatArray]  #: (n, m) each
+    C: Sequence[Matrix]  #: (p, n) each
+    D: Sequence[FloatArray]  #: (p, m) each
+
+    def seen(self, s: ComplexArray, x: ComplexArray) -> ComplexArray:
+        """Return ``C(s) x``, each column at its point."""
+        return np.asarray(sum(np.asarray(part @ (s**k * x)) for k, part in enumerate(self.C)))
+
+    def sizes(self, s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:
+        """Return the sizes of the terms of that."""
+        return sizes_of_terms(self.C, s, x)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class Response:
+    """What equations answer, known beyond the last digit, in k columns."""
+
+    x: ComplexArray  #: (n, k) rounded
+    y: ComplexArray  #: (p, k)
+    rounding: FloatArray  #: (p, k) what y is known to
+    shown: FloatArray  #: (p, k) sizes of the terms of ``C(s) x``
+
+
+def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: ComplexArray) -> Response:
+    """Solve for k columns, each at its point, and correct the solution until nothing that is seen of it changes.
+
+    Sums are as precise as the largest entry of a row times the largest unknown. So unknowns are measured in powers of
+    two near what they turn out to be.
+
+    Parameters
+    ----------
+    equations : Equations
+    solve : callable
+        Gives ``R(s)^-1`` times an (n, k) array to a digit or two.
+    s : (k,) complex ndarray
+    u : (m, k) complex ndarray
+    """
+    x = solve(np.asarray(sum(part @ (s**k * u) for k, part in enumerate(equations.B))))
+    units = powers_of_two(np.abs(x).max(axis=1, initial=0.0))
+    equation, output = (
+        ExactPolynomial([_beside(left, units, right) for left, right in zip(*parts, strict=True)])
+        for parts in ((equations.R, [-part for part in equations.B]), (equations.C, equations.D))
+    )
+
+    def together(x: ComplexArray, u: ComplexArray) -> ComplexArray:
+        return np.concatenate([units[:, None] * x, u])
+
+    rest = equation.residual(s, together(x, u))
+    low = step = solve(rest)
+    size = CORRECTED * np.abs(equations.seen(s, x))
+    for _ in range(MOST_CORRECTIONS - 1):
+        if (np.abs(equations.seen(s, step)) <= size).all():
+            break
+        rest = equation.residual(s, together(step, np.zeros_like(u)), rest)
+        step = solve(rest)
+        low = low + step
+    largest = np.abs(units[:, None] * x).max(axis=0, initial=0.0) / units[:, None]
+    rounding = (
+        np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low) + LAST_DIGIT * equations.sizes(s, largest)
+    )
+    y = equations.seen(s, low) - output.residual(s, together(x, u))
+    return Response(x=x, y=np.asarray(y), rounding=np.asarray(rounding), shown=equations.sizes(s, x))
+
+
+def sizes_of_terms(coefficients: Sequence[Matrix], s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:
+    """Return ``|C_0| |x| + |C_1| |s x| + ...``."""
+    return np.asarray(sum(np.asarray(abs(part) @ np.abs(s**k * x)) for k, part in enumerate(coefficients)))
+
+
+def _beside(left: Matrix, units: FloatArray, right: FloatArray) -> Matrix:
+    """Put a matrix, whose unknowns are measured in some units, and one of inputs side by side."""
+    if isinstance(left, np.ndarray):
+        return as_it_is(np.hstack([left / units, right]))
+    return csc_array(hstack([left @ diags_array(1.0 / units), csc_array(right)]))
+
+
+class StateSolver:
+    """``(s I - A)^-1``, factorized; where k states are derivatives of others, with k rows and columns less.
+
+    With ``A = [0 E; P R]``, E diagonal, of the k first rows ``E v = s p - b`` follows, and
+
+        (s - R) v - P p = c   is   ((s - R) E^-1 s - P) p = c + (s - R) E^-1 b.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A point is an eigenvalue.
+    """
+
+    def __init__(self, A: FloatArray, points: complex | ComplexArray) -> None:
+        self.points = np.atleast_1d(np.asarray(points, dtype=np.complex128))
+        self.matrix, self.scale = balanced_states(A)
+        N = len(A)
+        self.k = k = _derivatives(self.matrix)
+        self.rates = np.diagonal(self.matrix[:k, N - k :])[:, None].copy()
+        self.parts: list[tuple[complex, ComplexArray, tuple[Any, ...]]] = []
+        for s in self.points.tolist() if N else []:
+            lower = s * np.eye(N)[k:] - self.matrix[k:]
+            onto = lower[:, N - k :] / self.rates.T
+            reduced = lower[:, : N - k].copy()
+            reduced[:, :k] += s * onto
+            self.parts.append((s, onto, factorized(reduced)))
+
+    def solve(self, right: ComplexArray) -> ComplexArray:
+        """Return ``(s I - A)^-1 right`` for an (N, k) array."""
+        return np.asarray(self.scale[:, None] * self.balanced_solve(right / self.scale[:, None]))
+
+    def balanced_solve(self, right: ComplexArray) -> ComplexArray:
+        """Return the same for the balanced A."""
+        if not self.parts:
+            return right
+        pieces = []
+        for (s, onto, factors), part in zip(self.parts, np.hsplit(right, len(self.parts)), strict=True):
+            upper, k = part[: self.k], self.k
+            first = zgetrs(*factors, part[k:] + onto @ upper)[0]
+            pieces += [np.concatenate([first, (s * first[:k] - upper) / self.rates])]
+        return np.hstack(pieces)
+
+
+def pencil_solver(P: Sequence[Matrix], points: ComplexArray) -> Solver:
+    """Factorize ``P(s) = P_0 + P_1 s + P_2 s^2`` at each point and return what solves with it.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A point is an eigenvalue.
+    """
+    dense = [part if isinstance(part, np.ndarray) else part.toarray() for part in P]
+    factors = [factorized(np.asarray(sum(s**k * part for k, part in enumerate(dense)))) for s in points.tolist()]
+
+    def solve(right: ComplexArray) -> ComplexArray:
+        parts = np.hsplit(right, len(factors))
+        return np.hstack([zgetrs(*each, part)[0] for each, part in zip(factors, parts, strict=True)])
+
+    return solve
+
+
+def factorized(matrix: ComplexArray) -> tuple[Any, ...]:
+    """Return the factors of a complex matrix.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        It is singular.
+    """
+    factors, pivots, _ = zgetrf(matrix)
+    if not np.abs(np.diag(factors)).min() > 0.0:
+        msg = "s is an eigenvalue"
+        raise np.linalg.LinAlgError(msg)
+    return factors, pivots
+
+
+def _derivatives(A: FloatArray) -> int:
+    """Count the first states whose derivatives are last states, but for a factor."""
+    N = len(A)
+    for k in range(N // 2, 0, -1):
+        block = A[:k, N - k :]
+        if np.count_nonzero(A[:k]) == k and np.diagonal(block).all():
+            return k
+    return 0
