@@ -46,7 +46,7 @@ SHALLOW = 1e-3  #: of a channel's largest value at lower frequencies: below, a l
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
-SMALL_CHANNEL = 1e-6  #: of the motions that it shows: only a smaller channel can be zero but for rounding of M, C, K
+SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
 EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels, up to which few states lose nothing
 
 

@@ -47,7 +47,7 @@ class Response:
     x: ComplexArray  #: (n, k) rounded
     y: ComplexArray  #: (p, k)
     rounding: FloatArray  #: (p, k) what y is known to
-    shown: FloatArray  #: (p, k) sizes of the terms of ``C(s) x``
+    shown: FloatArray  #: (p, k) what ``C(s) x`` would be if all unknowns were as large as the largest
 
 
 def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: ComplexArray) -> Response:
@@ -88,7 +88,8 @@ def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: Co
         np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low) + LAST_DIGIT * equations.sizes(s, largest)
     )
     y = equations.seen(s, low) - output.residual(s, together(x, u))
-    return Response(x=x, y=np.asarray(y), rounding=np.asarray(rounding), shown=equations.sizes(s, x))
+    every = np.broadcast_to(np.abs(x).max(axis=0, initial=0.0), x.shape)
+    return Response(x=x, y=np.asarray(y), rounding=np.asarray(rounding), shown=equations.sizes(s, every))
 
 
 def sizes_of_terms(coefficients: Sequence[Matrix], s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:
