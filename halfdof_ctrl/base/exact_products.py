@@ -32,6 +32,7 @@ class SlicedMatrix:
     second: Any  #: so many bits more
     rest: Any
     bits: int
+    is_short: bool  #: whether the leading bits are all there are, as in the unit matrix
 
     @classmethod
     def of(cls, matrix: Matrix) -> "SlicedMatrix":
@@ -44,16 +45,18 @@ class SlicedMatrix:
             (first, second, rest), bits = _cut(entries.data, powers_of_two(size)[entries.indices], longest)
             place = (entries.indices, entries.indptr)
             shaped = [csc_array((part, *place), shape=entries.shape) for part in (first, second, rest)]
-            return cls(shaped[0], shaped[1], shaped[2], bits)
+            return cls(shaped[0], shaped[1], shaped[2], bits, not (second.any() or rest.any()))
         array = np.asarray(matrix, dtype=float)
         scale = powers_of_two(np.abs(array).max(axis=1, initial=0.0))[:, None]
         (first, second, rest), bits = _cut(array, scale, array.shape[1])
-        return cls(first, second, rest, bits)
+        return cls(first, second, rest, bits, not (second.any() or rest.any()))
 
     def times(self, x: FloatArray) -> list[FloatArray]:
         """Return parts whose sum is the product with an (n, k) array: three exact ones and one that is small."""
         scale = powers_of_two(np.abs(x).max(axis=0, initial=0.0))
         (first, second, rest), _ = _cut(x, scale, 1, self.bits)
+        if self.is_short:
+            return [self.first @ first, self.first @ second, self.first @ rest]
         small = self.first @ rest + self.second @ (second + rest) + self.rest @ x
         return [self.first @ first, self.first @ second, self.second @ first, small]
 
@@ -102,7 +105,9 @@ class ExactPolynomial:
             vector = powers[power]
             columns = x.shape[1]
             both = np.hstack([vector.real[0], vector.imag[0]])
-            parts = [*matrix.times(both), (matrix.first + matrix.second) @ np.hstack([vector.real[1], vector.imag[1]])]
+            parts = matrix.times(both)
+            if power:  # x itself has no errors
+                parts.append((matrix.first + matrix.second) @ np.hstack([vector.real[1], vector.imag[1]]))
             for part in parts:
                 value = part[:, :columns] + 1j * part[:, columns:]
                 total.subtract(value if unit == 1.0 else 1j * value)

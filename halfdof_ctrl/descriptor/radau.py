@@ -116,22 +116,23 @@ def _step_response(
 ) -> FloatArray:
     """Integrate ``E x' = A x + b`` from zero, for the outputs of x, of x' and of the inputs."""
     at_end, of_slope, direct = output
-    outputs = np.empty((*direct.shape, sum(segment.steps for segment in plan)))
+    outputs = np.empty((sum(segment.steps for segment in plan), *direct.shape))  # those of a step lie side by side
     if not A.size:
-        outputs[:] = direct[:, :, None]
-        return outputs
+        outputs[:] = direct
+        return outputs.transpose(1, 2, 0)
     x, done = np.zeros_like(b), 0
+    few, has_slope = as_it_is(at_end), of_slope.any()
     for segment in plan:
         step = RadauStep.factorized(E, A, segment.h)
         from_x, slope_from_x = step.advance(np.eye(len(A)), np.zeros((len(A), 1)))  # a step is affine in x
         from_b, slope_from_b = step.advance(np.zeros_like(b), b)
         before, constant = of_slope @ slope_from_x, of_slope @ slope_from_b + direct
         for k in range(done, done + segment.steps):
-            outputs[:, :, k] = before @ x + constant
+            outputs[k] = before @ x + constant if has_slope else constant
             x = from_x @ x + from_b
-            outputs[:, :, k] += at_end @ x
+            outputs[k] += few @ x
         done += segment.steps
-    return outputs
+    return outputs.transpose(1, 2, 0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

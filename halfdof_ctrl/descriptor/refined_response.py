@@ -6,16 +6,20 @@ Residuals are summed term by term in twice the working precision, so that x is a
 y, relative errors of eps in every entry change the response by
 
     eps (|y|^T (|P_0| + |s| |P_1| + |s|^2 |P_2|) |x| + |y|^T |B| + |F| |x| + |D|).           (DATA)
+
+Refinement takes several times as long as the solves, so it can be left for the columns of P x = B that ask for it.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
+from halfdof_ctrl.descriptor.matrix_polynomial import MatrixPolynomial
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import REFINED_ENOUGH
 
@@ -64,16 +68,7 @@ def refined_response(
     >>> found.values[0, 0, 0].real.item(), round(found.data[0, 0, 0].item() / float(np.finfo(float).eps), 3)
     (0.5, 1.5)
     """
-    shape = (*D[0].shape, points.size)
-    sizes = [np.full(shape, np.nan) for _ in range(3)]
-    found = RefinedResponse(np.full(shape, np.nan, dtype=np.complex128), *sizes)
-    evaluator = _Evaluator(P, B, F, D, exact_powers)
-    held = max(1, FACTORS_HELD // max(1, P[0].size))
-    for start in range(0, points.size, held):
-        places = list(range(start, min(start + held, points.size)))
-        evaluator.into(found, points, places)
-        advance(len(places))
-    return found
+    return ResponseEvaluator(P, B, F, D, points, exact_powers=exact_powers).response(advance=advance)
 
 
 @dataclass(slots=True, eq=False)
@@ -82,12 +77,12 @@ class _Point:
 
     place: int
     s: complex
+    inputs: IndexArray  #: columns of B
     rows: FloatArray
     columns: FloatArray
     lu: ComplexArray
     pivots: FloatArray
     right: ComplexArray
-    output: ComplexArray
     x: ComplexArray
 
     def solve(self, right: ComplexArray) -> ComplexArray:
@@ -98,57 +93,100 @@ class _Point:
         return np.asarray(solved * self.rows[:, None])
 
 
-class _Evaluator:
-    """Works through points, some at a time."""
+class ResponseEvaluator:
+    """Evaluates a dense model at points, with or without refinement, all columns or some.
+
+    Parameters are those of `refined_response`. Slopes and natural sizes are found for `sizes` alone.
+    """
 
     def __init__(
-        self, P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, exact_powers: tuple[int, ...]
+        self,
+        P: Coefficients,
+        B: Coefficients,
+        F: Coefficients,
+        D: Coefficients,
+        points: ComplexArray,
+        *,
+        exact_powers: tuple[int, ...] = (),
+        sizes: bool = True,
     ) -> None:
-        self.P, self.B, self.F, self.D = P, B, F, D
+        self.P, self.B, self.F, self.D = (MatrixPolynomial(parts) for parts in (P, B, F, D))
+        self.touched = MatrixPolynomial([0.0 * part if k in exact_powers else part for k, part in enumerate(P)])
         self.exact = ExactPolynomial([as_it_is(part) for part in P])
-        self.sizes = [np.abs(part) if k not in exact_powers and part.any() else None for k, part in enumerate(P)]
+        self.points, self.sizes = points, sizes
 
-    def into(self, found: RefinedResponse, points: ComplexArray, places: list[int]) -> None:
-        """Write what is found at some of the points."""
-        with np.errstate(all="ignore"):
-            tried = [self._factorized(place, complex(points[place])) for place in places]
-            solved = [point for point in tried if point is not None]
-            self._refine(solved)
-            for point in solved:
-                self._finish(found, point)
+    def response(self, *, refined: bool = True, advance: Callable[[int], None] = lambda _: None) -> RefinedResponse:
+        """Evaluate all columns at every point."""
+        shape = (self.points.size, *self.D.shape)
+        values = np.full(shape, np.nan, dtype=np.complex128)
+        sizes = [np.full(shape if needed else (1, 1, 1), np.nan) for needed in (True, self.sizes, self.sizes)]
+        turned = [part.transpose(1, 2, 0) for part in (values, *sizes)]  # the values at a point lie side by side
+        found = RefinedResponse(turned[0], turned[1], turned[2], turned[3])
+        self._into(found, np.ones((self.D.shape[1], self.points.size), dtype=bool), refined, advance)
+        return found
 
-    def _factorized(self, place: int, s: complex) -> _Point | None:
-        matrix = _at(self.P, s)
+    def refine(
+        self, found: RefinedResponse, wanted: npt.NDArray[np.bool_], advance: Callable[[int], None] = lambda _: None
+    ) -> None:
+        """Evaluate some columns anew, refined: `wanted` says of each of the m inputs at which of the k points."""
+        self._into(found, wanted, refined=True, advance=advance)
+
+    def _into(
+        self,
+        found: RefinedResponse,
+        wanted: npt.NDArray[np.bool_],
+        refined: bool,  # noqa: FBT001  # of the two public ones above
+        advance: Callable[[int], None],
+    ) -> None:
+        """Write what is found, some points at a time."""
+        places = np.flatnonzero(wanted.any(axis=0)) if wanted.size else np.arange(self.points.size)
+        held = max(1, FACTORS_HELD // max(1, self.P.shape[0] ** 2))
+        for start in range(0, places.size, held):
+            chosen = places[start : start + held].tolist()
+            with np.errstate(all="ignore"):
+                tried = [self._factorized(place, np.flatnonzero(wanted[:, place])) for place in chosen]
+                solved = [point for point in tried if point is not None]
+                if refined:
+                    self._refine(solved)
+                for point in solved:
+                    self._finish(found, point)
+            advance(len(chosen))
+
+    def _factorized(self, place: int, inputs: IndexArray) -> _Point | None:
+        s = complex(self.points[place])
+        matrix, right = self.P.at(s), self.B.at(s)[:, inputs]
         if not len(matrix):
             empty = np.zeros(0)
-            right, output = _at(self.B, s), _at(self.F, s)
-            return _Point(place, s, empty, empty, matrix, empty, right, output, right)
-        rows = powers_of_two(np.abs(matrix).max(axis=1))
-        matrix = matrix * rows[:, None]
-        columns = powers_of_two(np.abs(matrix).max(axis=0))
-        lu, pivots, info = zgetrf(matrix * columns, overwrite_a=True)
+            return _Point(place, s, inputs, empty, empty, matrix, empty, right, right)
+        size = np.abs(matrix)
+        rows = powers_of_two(size.max(axis=1))
+        size *= rows[:, None]
+        columns = powers_of_two(size.max(axis=0))
+        matrix *= rows[:, None]
+        matrix *= columns
+        lu, pivots, info = zgetrf(matrix, overwrite_a=True)
         if info != 0:
             return None
-        point = _Point(place, s, rows, columns, lu, pivots, _at(self.B, s), _at(self.F, s), matrix)
-        point.x = point.solve(point.right)
+        point = _Point(place, s, inputs, rows, columns, lu, pivots, right, right)
+        point.x = point.solve(right)
         return point
 
-    def _refine(self, solved: list[_Point]) -> None:
+    def _refine(self, solved: Sequence[_Point]) -> None:
         """Refine the solutions of all points until corrections are small or no longer shrink."""
         last = {point.place: np.inf for point in solved}
         left = [point for point in solved if point.x.size]
         for _ in range(MOST_ROUNDS):
             if not left:
                 return
-            columns = left[0].x.shape[1]
+            counts = [point.inputs.size for point in left]
             residual = self.exact.residual(
-                np.repeat([point.s for point in left], columns),
+                np.repeat([point.s for point in left], counts),
                 np.hstack([point.x for point in left]),
                 np.hstack([point.right for point in left]),
             )
             further = []
-            for k, point in enumerate(left):
-                correction = point.solve(residual[:, k * columns : (k + 1) * columns])
+            for point, part in zip(left, np.split(residual, np.cumsum(counts)[:-1], axis=1), strict=True):
+                correction = point.solve(part)
                 share = _share(correction, point.x)
                 if not share < min(1.0, last[point.place]):
                     continue
@@ -159,20 +197,19 @@ class _Evaluator:
             left = further
 
     def _finish(self, found: RefinedResponse, point: _Point) -> None:
-        s, x = point.s, point.x
-        y = point.solve_transposed(point.output.T.copy()).T if x.size or len(point.rows) else point.output
-        found.values[:, :, point.place] = point.output @ x + _at(self.D, s)
-        change = _slope(self.B, s) - _slope(self.P, s) @ x
-        moved = y @ change + _slope(self.F, s) @ x + _slope(self.D, s)
-        found.slope[:, :, point.place] = np.abs(s * moved)
+        s, x, inputs = point.s, point.x, point.inputs
+        output = self.F.at(s)
+        y = point.solve_transposed(output.T).T if x.size or len(point.rows) else output
+        found.values[:, inputs, point.place] = self.F.times(s, x) + self.D.at(s)[:, inputs]
         (sx, most), (sy, _) = _sizes(x, point.columns), _sizes(y.T, point.rows)
-        terms = _size_at(self.B, s)
-        for power, size in enumerate(self.sizes):
-            if size is not None:
-                terms = terms + abs(s) ** power * (size @ sx)
-        output = _size_at(self.F, s)
-        found.data[:, :, point.place] = EPS * (sy.T @ terms + output @ sx + _size_at(self.D, s))
-        found.natural[:, :, point.place] = output @ most
+        terms = self.B.size_at(s)[:, inputs] + self.touched.size_times(s, sx)
+        data = sy.T @ terms + self.F.size_times(s, sx) + self.D.size_at(s)[:, inputs]
+        found.data[:, inputs, point.place] = EPS * data
+        if self.sizes:
+            change = self.B.slope_at(s)[:, inputs] - self.P.slope_times(s, x)
+            moved = y @ change + self.F.slope_times(s, x) + self.D.slope_at(s)[:, inputs]
+            found.slope[:, inputs, point.place] = np.abs(s * moved)
+            found.natural[:, inputs, point.place] = self.F.size_times(s, most)
 
 
 def _share(correction: ComplexArray, x: ComplexArray) -> float:
@@ -187,26 +224,6 @@ def _sizes(x: ComplexArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     One that should be zero is only as small as rounding lets it be.
     """
-    most = (np.abs(x) / scale[:, None]).max(axis=0, initial=0.0) * scale[:, None]
-    return np.abs(x) + EPS * most, most
-
-
-def _at(coefficients: Coefficients, s: complex) -> ComplexArray:
-    value = np.asarray(coefficients[0], dtype=np.complex128)
-    for power, part in enumerate(coefficients[1:], start=1):
-        if part.any():
-            value = value + s**power * part
-    return value
-
-
-def _size_at(coefficients: Coefficients, s: complex) -> FloatArray:
-    return np.asarray(sum(abs(s) ** power * np.abs(part) for power, part in enumerate(coefficients)))
-
-
-def _slope(coefficients: Coefficients, s: complex) -> DenseMatrix:
-    """Return the derivative of a matrix polynomial."""
-    value: DenseMatrix = np.zeros(coefficients[0].shape)
-    for power, part in enumerate(coefficients[1:], start=1):
-        if part.any():
-            value = value + power * s ** (power - 1) * part
-    return value
+    size = np.abs(x)
+    most = (size / scale[:, None]).max(axis=0, initial=0.0) * scale[:, None]
+    return size + EPS * most, most

@@ -21,7 +21,6 @@ from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.progress import progress_bar
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.descriptor.first_order import typical_frequency
-from halfdof_ctrl.descriptor.refined_response import refined_response
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import PencilStructure, pencil_structure
 from halfdof_ctrl.model.dense_copy import complex_model_error
@@ -42,7 +41,7 @@ from halfdof_ctrl.systems.sparse_check import (
     sparse_response,
 )
 from halfdof_ctrl.systems.step_check import StepCheck, compare_steps
-from halfdof_ctrl.systems.transfer_check import TransferCheck, compare_transfer
+from halfdof_ctrl.systems.transfer_check import TransferCheck, compare_transfer, system_response, transfer_of_both
 
 POINT_WORK = 5e9  #: points times the cubes of DOFs and states, which takes about as long as the eigenvalues do
 POINT_VALUES = 2**22  #: values of all channels at all points
@@ -130,8 +129,7 @@ def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
         poles, gamma = refined_poles(np.asarray(sys.A, dtype=float)), typical_frequency(model)
         moving = moving_eigenvalues(finite, poles, gamma)
         points = check_points(moving, most)
-        exact = refined_response(*model.quadratics, points, advance=advance)
-        transfer = compare_transfer(model, sys, points, exact, advance)
+        transfer = compare_transfer(model, sys, points, *transfer_of_both(model, sys, points, advance))
         of_poles = compare_poles(model, poles, finite, bounds, gamma, most=structure.most_finite)
         advance(1)
         steps = compare_steps(model, sys, moving, transfer.zero_scale)
@@ -154,8 +152,8 @@ def _compared_sparsely(model: SecondOrderModel, sys: control.StateSpace) -> Cros
         poles = refined_poles(np.asarray(sys.A, dtype=float))
         away = poles.values[~poles.at_origin]
         points = check_points(away if away.size else np.array([-1.0 + 0.0j]), FEWEST_POINTS)
-        exact = sparse_response(model, points, advance)
-        transfer = compare_transfer(model, sys, points, exact, advance)
+        exact, found = sparse_response(model, points, advance), system_response(sys, points, advance)
+        transfer = compare_transfer(model, sys, points, exact, found)
         of_poles = compare_some_poles(model, poles)
     not_followed = StepCheck(judged=Judged.nothing("not followed"), horizon=0.0, evaluation=0.0, evaluation_worst="")
     return CrossCheck(

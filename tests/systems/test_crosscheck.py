@@ -7,6 +7,8 @@ import control
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
 from halfdof_ctrl import (
     CrossCheck,
@@ -26,10 +28,12 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
     recording_warnings,
 )
+from halfdof_ctrl.systems import transfer_check
 from halfdof_ctrl.systems.judged import Grade
 from halfdof_ctrl.systems.pole_check import compare_poles
 from halfdof_ctrl.systems.refined_poles import refined_poles
 from halfdof_ctrl.systems.state_space import system_of_model
+from halfdof_ctrl.systems.transfer_check import DOUBTED
 from support.beams import cantilever
 from support.benchmark_circuits import hinged_beam, rotor_in_rigid_bearing, two_track_mount
 from support.benchmark_mechanisms import gear_train, seven_body_mechanism
@@ -447,3 +451,36 @@ def test_long_names_leave_the_table_readable() -> None:
     check = crosscheck(model, mech2ss(model))
     assert max(map(len, repr(check).splitlines())) < 80
     assert check.transfer_worst.startswith("displacement_of_the_engine_at_its_mount_")
+
+
+def both_ways(model: SecondOrderModel, sys: control.StateSpace) -> tuple[CrossCheck, CrossCheck]:
+    """Check with every value refined, and as models with many values are checked."""
+    every = crosscheck(model, sys)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(transfer_check, "FEW_VALUES", 0)
+        return every, crosscheck(model, sys)
+
+
+@settings(max_examples=FEWER)
+@given(structure=damped_structures())
+def test_refining_where_the_sides_differ_says_what_refining_all_says(structure: Structure) -> None:
+    """Verdict and figures of right systems; errors below a hundredth of the tolerance may be those of the solves."""
+    model = structure.model()
+    every, some = both_ways(model, system_of_model(model))
+    assert some.verdict.split("(")[0] == every.verdict.split("(")[0]
+    assert some.transfer_grade == every.transfer_grade
+    assert some.max_transfer_error <= max(every.max_transfer_error, DOUBTED) * (1.0 + CHANGE)
+    assert_allclose([some.data_limit, some.double_limit], [every.data_limit, every.double_limit], rtol=CHANGE)
+
+
+@settings(max_examples=FEWER)
+@given(structure=damped_structures(), share=st.sampled_from([1e-6, 1e-9, 3e-10, 1e-11]))
+def test_refining_where_the_sides_differ_lets_no_wrong_system_off(structure: Structure, share: float) -> None:
+    """Every grade of an output matrix that is off, down to an error below the tolerance, is the same both ways."""
+    model = structure.model()
+    sys = system_of_model(model)
+    broken = control.StateSpace(sys.A, sys.B, sys.C * (1.0 + share), sys.D * (1.0 + share))
+    every, some = both_ways(model, broken)
+    assert some.transfer_grade == every.transfer_grade
+    assert some.max_transfer_error == pytest.approx(every.max_transfer_error, rel=CHANGE)
+    assert some.transfer_worst == every.transfer_worst
