@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from halfdof_ctrl.base.command_start import PROGRAM
 from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
-from halfdof_ctrl.base.names import printable
+from halfdof_ctrl.base.printable import printable
 from halfdof_ctrl.base.progress import activity, clear_activity
 from halfdof_ctrl.commands import (
     BUILT_IN_MODELS,

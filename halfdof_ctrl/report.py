@@ -14,6 +14,7 @@ from pathlib import Path
 import control
 import numpy as np
 
+from halfdof_ctrl.base.doors import require_path
 from halfdof_ctrl.base.errors import (
     FileFormatError,
     HalfdofError,
@@ -96,6 +97,7 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     True
     """
     n = len(checked_model(model, "write_report").dofs)
+    require_path(folder, "write_report", parameter="folder", kind="folder")
     model = dense_copy(model, "write_report", "Report a reduced model: write_report(truncate_modes(...), folder).")
     target = Path(folder).resolve()
     _require_own_folder(target, folder)
@@ -296,7 +298,7 @@ def _fill(folder: Path, findings: Findings, plots: list[_Plot]) -> None:
 def _require_own_folder(target: Path, given: PathLike) -> None:
     index = target / INDEX
     foreign = index.exists() and not (index.is_file() and PAGE_MARK in index.read_text("utf-8", errors="replace"))
-    if foreign or (target.exists() and not target.is_dir()):
+    if foreign or not target.name or (target.exists() and not target.is_dir()):
         msg = f"{given}: there is something of that name that is no report. Choose another folder."
         raise FileFormatError(msg, path=str(given))
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 from types import FrameType
 
 from halfdof_ctrl.base.command_start import is_command
-from halfdof_ctrl.base.names import printable
+from halfdof_ctrl.base.printable import printable
 from halfdof_ctrl.base.progress import clear_activity
 
 STDOUT, STDERR = 1, 2  #: file descriptors

@@ -209,7 +209,10 @@ def is_zero_number(value: object) -> bool:
     """Return whether a value is the number 0, of any type; a matrix of zeros is none."""
     if isinstance(value, np.ndarray):
         return value.ndim == 0 and bool(value == 0)
-    return np.isscalar(value) and bool(value == 0)
+    try:
+        return np.isscalar(value) and bool(value == 0)
+    except Exception:  # noqa: BLE001  # such as a signalling NaN of `decimal`, which compares with nothing
+        return False
 
 
 def full_square(value: object) -> object:

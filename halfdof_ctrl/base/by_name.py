@@ -3,9 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeVar
 
-import numpy as np
-
-from halfdof_ctrl.base.doors import wrong_object
+from halfdof_ctrl.base.doors import is_whole_number, wrong_object
 from halfdof_ctrl.base.names import LARGEST_NUMBER, MOST_LISTED, unknown_name_error
 
 Value = TypeVar("Value")
@@ -33,8 +31,8 @@ def by_name(given: Mapping[Any, Value], known: Sequence[str], what: str) -> dict
     among = known if len(items) <= MOST_LISTED else set(known)
     found: dict[str, Value] = {}
     for key, value in items:
-        number = isinstance(key, int | np.integer) and not isinstance(key, bool)
-        name = str(key) if isinstance(key, str) or (number and abs(key) <= LARGEST_NUMBER) else None
+        number = is_whole_number(key) and abs(key) <= LARGEST_NUMBER
+        name = str(key) if isinstance(key, str) or number else None
         if name is None or name not in among:
             raise unknown_name_error(key if name is None else name, what, known)
         found[name] = value

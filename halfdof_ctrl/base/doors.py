@@ -4,8 +4,9 @@ A wrong object is refused where it enters, since further in it ends in an error 
 """
 
 import os
+import re
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ Item = TypeVar("Item")
 LARGEST = int(np.finfo(float).max)  #: a Python integer has no largest one
 LONGEST_SHOWN = 60  #: characters of a wrong value in a message
 OTHER_NAMES = {"control.statesp": "control", "control.xferfcn": "control", "control.frdata": "control"}
+ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")  #: of an object that has no text of its own; it tells nobody anything
 NAMELESS = frozenset({"builtins", "numpy"})  #: modules whose types everybody knows without them
 
 
@@ -46,6 +48,7 @@ def shown(value: object) -> str:
         text = repr(value)
     except Exception:  # noqa: BLE001  # the object is the user's, and so is its __repr__
         return f"<{type(value).__name__}>"
+    text = ADDRESS.sub("", text)
     return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
@@ -78,9 +81,19 @@ def is_real_number(value: object) -> bool:
     """Return whether a value is one real number that a float holds; neither text nor a truth value is."""
     if type(value) is float:  # the usual case at once
         return True
-    if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    return not isinstance(value, int) or abs(value) <= LARGEST
+    if is_whole_number(value):
+        return not isinstance(value, int) or abs(value) <= LARGEST
+    return isinstance(value, float | np.floating)
+
+
+def is_whole_number(value: object) -> TypeGuard[int]:
+    """Return whether a value is a whole number; neither a truth value nor a span of time is, whatever their classes."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
+
+
+def is_mapping(value: object) -> TypeGuard[Mapping[Any, Any]]:
+    """Return whether a value maps names to something; a sparse matrix does not, whatever its class."""
+    return isinstance(value, Mapping) and not hasattr(value, "nnz")
 
 
 def require_mapping(value: object, parameter: str, meaning: str) -> None:
@@ -92,7 +105,7 @@ def require_mapping(value: object, parameter: str, meaning: str) -> None:
         It is none.
     """
     try:
-        sound = isinstance(value, Mapping) and list(value.items()) is not None
+        sound = is_mapping(value) and list(value.items()) is not None
     except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
         sound = False
     if not sound:
@@ -147,23 +160,27 @@ def require_switch(value: object, parameter: str) -> None:
         raise wrong_object(parameter, "True or False", value, parameter=parameter)
 
 
-def require_path(value: object, taker: str) -> None:
-    """Refuse what names no file.
+def require_path(value: object, taker: str, *, parameter: str = "path", kind: str = "file") -> None:
+    """Refuse what names no file, or folder.
 
     Raises
     ------
     WrongObjectError
         It is no text and no path.
     """
-    if not isinstance(value, str | os.PathLike) or not isinstance(os.fspath(value), str):
-        raise wrong_object(taker, "the path of a file, a text or pathlib.Path", value, parameter="path")
     try:
-        sound = b"\0" not in os.fsencode(value)
+        text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
+        text = None
+    if not isinstance(text, str):
+        raise wrong_object(taker, f"the path of a {kind}, a text or pathlib.Path", value, parameter=parameter)
+    try:
+        sound = b"\0" not in os.fsencode(text)
     except UnicodeEncodeError:
         sound = False
     if not sound:
         msg = f"{taker} is {shown(value)}, which holds characters that no file system takes. Take others."
-        raise ParameterError(msg, parameter="path", value=value)
+        raise ParameterError(msg, parameter=parameter, value=value)
 
 
 def answer_of(function: Callable[..., Any], *arguments: object, parameter: str, meaning: str) -> Any:  # noqa: ANN401
@@ -225,11 +242,12 @@ def real_numbers(value: Any, parameter: str, meaning: str) -> FloatArray:  # noq
     """
     try:
         given = np.asarray(value)
-        numbers = given.astype(float) if given.dtype.kind in "biufO" else None
+        text = given.dtype == object and any(_is_no_number(entry) for entry in given.flat)
+        numbers = given.astype(float) if given.dtype.kind in "biufO" and not text else None
     except Exception as cause:
         msg = f"{parameter} must be {meaning}, not {shown(value)}: {str(cause).rstrip('.')}."
         raise ParameterError(msg, parameter=parameter, value=value) from cause
-    if numbers is None or (given.dtype == object and any(_is_no_number(entry) for entry in given.flat)):
+    if numbers is None:
         msg = f"{parameter} must be {meaning}, not {shown(value)}."
         raise ParameterError(msg, parameter=parameter, value=value)
     return numbers

@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import NamedTuple
 
+from halfdof_ctrl.base.printable import printable
+
 
 def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object]) -> "HalfdofError":
     """Make an error again on the other side of a process boundary."""
@@ -22,6 +24,10 @@ def _rebuild(kind: type["HalfdofError"], message: str, facts: dict[str, object])
 
 class HalfdofError(ValueError):
     """Base of every refusal of this package."""
+
+    def __init__(self, *given: object) -> None:
+        """Take a message, in which names from files and objects of the user's cannot steer a terminal."""
+        super().__init__(*[printable(part) if isinstance(part, str) else part for part in given])
 
     def __reduce__(self) -> tuple[Callable[..., "HalfdofError"], tuple[object, ...]]:
         """Pickle by message and facts, since children take keyword-only arguments."""
@@ -282,7 +288,7 @@ _RECORD: ContextVar[list[RecordedWarning] | None] = ContextVar("halfdof_ctrl_war
 
 def give_warning(message: str, category: type[HalfdofWarning]) -> None:
     """Warn the line of the user's that called this package, or let who records warnings in this thread have it."""
-    record = _RECORD.get()
+    record, message = _RECORD.get(), printable(message)
     if record is None:
         warnings.warn(message, category, stacklevel=callers_level())
     else:

@@ -11,11 +11,10 @@ from functools import lru_cache
 from itertools import chain, islice
 from typing import Literal, TypeAlias
 
-import numpy as np
-
-from halfdof_ctrl.base.doors import described, shown
+from halfdof_ctrl.base.doors import described, is_whole_number, shown
 from halfdof_ctrl.base.errors import SignalNameError
 from halfdof_ctrl.base.near_names import nearest_names
+from halfdof_ctrl.base.printable import UNPRINTED
 
 Names: TypeAlias = str | Sequence[str] | None
 
@@ -28,7 +27,6 @@ SIGNAL_WORDS = {
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
 MOST_NAMES = 10**8  #: more than memory holds: an iterator without an end is stopped there
 MOST_LISTED = 8  #: names that a message spells out
-UNPRINTED = ("Cc", "Cf", "Cs", "Zl", "Zp")  #: categories of Unicode that a terminal or a table obeys instead of showing
 LARGEST_NUMBER = 10**18  #: node numbers of all programs are smaller
 MOST_CACHED = 1000  #: names of larger models are made anew each time, since a cache would hold on to them
 
@@ -179,22 +177,6 @@ def _acts_on_a_terminal(text: str) -> bool:
     return any(unicodedata.category(letter) in UNPRINTED for letter in text)
 
 
-def printable(text: str) -> str:
-    r"""Write control characters other than line ends and tabs as escapes, so that a terminal obeys none of them.
-
-    >>> printable("a\x1b[31m")
-    'a\\x1b[31m'
-    """
-    if text.isprintable():
-        return text
-    return "".join(
-        letter.encode("unicode_escape").decode()
-        if letter not in "\n\t" and unicodedata.category(letter) in UNPRINTED
-        else letter
-        for letter in text
-    )
-
-
 def checked_dofs(given: str | Sequence[str], count: int) -> tuple[str, ...]:
     """Check the names of the DOFs, and that their velocities and accelerations have names of their own.
 
@@ -270,9 +252,8 @@ def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
 
 def _no_names_error(given: object, what: str) -> SignalNameError:
     """Make the refusal of a single thing in place of names."""
-    number = isinstance(given, int | np.integer) and not isinstance(given, bool)
     order = ", whose order changes from run to run" if isinstance(given, set | frozenset) else ""
-    example = f"[{given}]" if number and abs(int(given)) <= LARGEST_NUMBER else "['a', 'b']"  # type: ignore[call-overload]
+    example = f"[{given}]" if is_whole_number(given) and abs(given) <= LARGEST_NUMBER else "['a', 'b']"
     msg = (
         f"Names{f' of {what}' if what else ''} must be a text or a list of texts, not {described(given)}{order}. "
         f"Give a list, such as {example}."
@@ -282,7 +263,7 @@ def _no_names_error(given: object, what: str) -> SignalNameError:
 
 def _as_texts(names: tuple[object, ...], what: str) -> tuple[str, ...]:
     for name in names:
-        if isinstance(name, bool) or not isinstance(name, str | int | np.integer):
+        if not (isinstance(name, str) or is_whole_number(name)):
             msg = (
                 f"Names{f' of {what}' if what else ''} must be non-empty text without blanks at the ends, or whole "
                 f"numbers in a list, not a {type(name).__name__}. Name each one."

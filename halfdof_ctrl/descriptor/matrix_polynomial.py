@@ -20,8 +20,9 @@ class MatrixPolynomial:
     ``3 + 2 s`` at 2j, times 5, and its slope:
 
     >>> polynomial = MatrixPolynomial([np.array([[3.0]]), np.array([[2.0]])])
-    >>> polynomial.at(2j).tolist(), polynomial.times(2j, np.array([[5.0 + 0j]])).tolist(), polynomial.slope_at(2j)
-    ([[(3+4j)]], [[(15+20j)]], array([[2.]]))
+    >>> five = np.array([[5.0 + 0j]])
+    >>> [found.item() for found in (polynomial.at(2j), polynomial.times(2j, five), polynomial.slope_at(2j))]
+    [(3+4j), (15+20j), (2+0j)]
     """
 
     def __init__(self, coefficients: Coefficients) -> None:
@@ -56,17 +57,17 @@ class MatrixPolynomial:
 
     def times(self, s: complex, x: ComplexArray) -> ComplexArray:
         """Return the value times an (n, k) array."""
-        return _summed([(s**power, factor) for power, factor in self._factors], x, self.shape[0])
+        return np.asarray(_summed([(s**power, factor) for power, factor in self._factors], x, self.shape[0]))
 
     def slope_times(self, s: complex, x: ComplexArray) -> ComplexArray:
         """Return the derivative times an (n, k) array."""
         terms = [(power * s ** (power - 1), factor) for power, factor in self._factors if power]
-        return _summed(terms, x, self.shape[0])
+        return np.asarray(_summed(terms, x, self.shape[0]))
 
     def size_times(self, s: complex, x: FloatArray) -> FloatArray:
         """Return the sum of the sizes of the terms times an (n, k) array of sizes."""
         terms = [(abs(s) ** power, factor) for power, factor in self._size_factors]
-        return _summed(terms, x, self.shape[0])
+        return np.asarray(_summed(terms, x, self.shape[0]))
 
 
 def _summed(terms: list[tuple[Any, Any]], x: Any, rows: int) -> Any:  # noqa: ANN401  # real and complex alike

@@ -8,12 +8,12 @@ classes join parts. Elements know no model; that a DOF exists is seen where they
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from halfdof_ctrl.base.doors import is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError, SignalNameError
-from halfdof_ctrl.base.names import Names, as_tuple, checked_names
+from halfdof_ctrl.base.names import Names, as_tuple, checked_names, listed
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.model.laws import as_typed
 
@@ -219,3 +219,36 @@ def _checked_law(kind: str, a: str, b: str | None, law: Any) -> Law | float:  # 
 def _typed(kind: str, a: str, b: str | None, law: Law | float) -> str:
     ends = f'"{a}"' if b is None else f'"{a}", "{b}"'
     return f"{kind}({ends}, law={law if isinstance(law, Law) else as_typed(law)})"
+
+
+def element_dofs(element: Element) -> tuple[str, ...]:
+    """Return the DOFs that an element knows, those that it acts on first."""
+    if isinstance(element, Force):
+        return tuple(dict.fromkeys((*element.on, *element.displacements, *element.velocities)))
+    return (element.a,) if element.b is None else (element.a, element.b)
+
+
+def grounded(element: Element, words: str, dofs: tuple[str, ...]) -> Element | None:
+    """Return an element whose ends are DOFs that are left, or the ground instead; None where it pulls at nothing.
+
+    Raises
+    ------
+    SignalNameError
+        A `Force` that knows a DOF that is not left, or a law that begins at one and would have to be turned round.
+    """
+    if isinstance(element, Force):
+        gone = [name for name in element_dofs(element) if name not in dofs]
+        if gone:
+            msg = f"{words} knows {listed(gone)}, which cannot be taken out from under it. Make the model without it."
+            raise SignalNameError(msg, names=tuple(gone))
+        return element
+    ends = [end for end in (element.a, element.b) if end in dofs]
+    if not ends:
+        return None
+    if element.a not in dofs and not element.is_linear:
+        msg = (
+            f"{words} begins at {element.a}, which is taken out, and its law need not be the same the other way round. "
+            f"Make it from {element.b} to {element.a}, or leave it out."
+        )
+        raise SignalNameError(msg, names=(element.a,))
+    return replace(element, a=ends[0], b=ends[1] if len(ends) > 1 else None)

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from halfdof_ctrl.base.doors import shown
+from halfdof_ctrl.base.doors import real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 
 Function: TypeAlias = Callable[[Any], Any]
@@ -159,7 +159,7 @@ def _limit(quotients: np.ndarray) -> float:
 
 def _is_rising_pair(pair: object) -> bool:
     try:
-        low, high = (float(value) for value in pair)  # type: ignore[attr-defined]
+        low, high = real_numbers(pair, "bounds", "two numbers").tolist()
+        return bool(low < high)
     except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
         return False
-    return low < high

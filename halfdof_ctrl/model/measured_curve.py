@@ -61,7 +61,8 @@ class MeasuredCurve:
 
     def _piece(self, x: Any) -> tuple[FloatArray, FloatArray]:  # noqa: ANN401
         """Give the coefficients of the cube at x and the way from the point where it begins."""
-        at = np.asarray(x, dtype=float)
+        plain = isinstance(x, np.ndarray) and x.dtype == np.float64  # as the integration calls it
+        at = x if plain else real_numbers(x, "x", "real numbers")
         place = np.searchsorted(self.points, at, side="right")
         if not self.extended:  # the last point belongs to the last interval
             place = np.where(at == self.points[-1], self.points.size - 1, place)

@@ -21,7 +21,7 @@ from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SignalNameE
 from halfdof_ctrl.base.names import Names, listed, reaction_names, unknown_name_error
 from halfdof_ctrl.model.checked_laws import check_force, check_law
 from halfdof_ctrl.model.dense_copy import complex_model_error
-from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
+from halfdof_ctrl.model.elements import Damper, Element, Force, Spring, element_dofs, grounded
 from halfdof_ctrl.model.law import Law
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -114,6 +114,21 @@ class NonlinearModel:
     def select(self, inputs: Names = None, outputs: Names = None) -> "NonlinearModel":
         """Return the model with other inputs and outputs, picked by name as `SecondOrderModel.select` does."""
         return replace(self, linear=self.linear.select(inputs, outputs))
+
+    def without(self, dofs: Names) -> "NonlinearModel":
+        """Return the model without some DOFs, as `SecondOrderModel.without` does: held at rest.
+
+        An element that ends at one of them ends at the ground then; one with both ends there is left out.
+
+        Raises
+        ------
+        SignalNameError
+            As there; or a `Force` knows one of them, or an element with a law begins there.
+        """
+        linear = self.linear.without(dofs)
+        names = zip(self.elements, element_words(self.elements), strict=True)
+        left = [grounded(element, words, linear.dofs) for element, words in names]
+        return nlmechss(linear, [element for element in left if element is not None])
 
     @property
     def partition(self) -> Any:  # noqa: ANN401
@@ -307,13 +322,6 @@ def listed_elements(elements: Sequence[Element], most: int = 8) -> list[str]:
         for label, element in zip(_labels(elements), elements, strict=True)
     ]
     return lines if len(lines) <= most else [*lines[:most], f"and {len(lines) - most} more elements"]
-
-
-def element_dofs(element: Element) -> tuple[str, ...]:
-    """Return the DOFs that an element knows, those that it acts on first."""
-    if isinstance(element, Force):
-        return tuple(dict.fromkeys((*element.on, *element.displacements, *element.velocities)))
-    return (element.a,) if element.b is None else (element.a, element.b)
 
 
 def direction(element: Spring | Damper, dofs: tuple[str, ...]) -> FloatArray:

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, read_only
-from halfdof_ctrl.model.elements import Damper, Element, Force, Spring
+from halfdof_ctrl.model.elements import Damper, Element, Force, Spring, element_dofs
 from halfdof_ctrl.model.law import Law
-from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_dofs, element_words, split_actions
+from halfdof_ctrl.model.nonlinear import NonlinearModel, direction, element_words, split_actions
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.judgement import judged
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.doors import answer_of, real_numbers, shown
+from halfdof_ctrl.base.doors import answer_of, is_mapping, real_numbers, shown
 from halfdof_ctrl.base.errors import MatrixError, ParameterError
 from halfdof_ctrl.base.names import unknown_name_error
 
@@ -65,13 +65,13 @@ def constant_inputs(given: Any, names: tuple[str, ...]) -> FloatArray:  # noqa: 
     SignalNameError
         A name that is no input.
     """
-    if isinstance(given, Mapping):
+    if is_mapping(given):
         _require_known(given, names)
         given = [given.get(name, 0.0) for name in names]
     try:
-        values = np.asarray(0.0 if given is None else given, dtype=float)
+        values = real_numbers(0.0 if given is None else given, "inputs", "numbers")
         values = np.array(np.broadcast_to(values, (len(names),)))
-    except (TypeError, ValueError) as cause:
+    except (ParameterError, ValueError) as cause:
         msg = f"inputs must be a number, or one for each of {len(names)} inputs, not {shown(given)}."
         raise MatrixError(msg, matrix="inputs") from cause
     if not np.isfinite(values).all():
@@ -100,7 +100,7 @@ def joined(times: FloatArray, samples: FloatArray) -> Callable[[float], FloatArr
 def _parts(given: Any, names: tuple[str, ...], times: FloatArray) -> list[Any]:  # noqa: ANN401
     """Return a number, row of samples or function for each input."""
     m = len(names)
-    if isinstance(given, Mapping):
+    if is_mapping(given):
         _require_known(given, names)
         return [given.get(name, 0.0) for name in names]
     if given is None or np.isscalar(given) or callable(given):
@@ -123,8 +123,8 @@ def _parts(given: Any, names: tuple[str, ...], times: FloatArray) -> list[Any]: 
 
 def _ragged(given: Sequence[Any], m: int, times: FloatArray) -> npt.NDArray[Any]:
     try:
-        return np.asarray(given, dtype=float)
-    except (TypeError, ValueError) as cause:
+        return real_numbers(given, "inputs", "numbers, samples or functions of time")
+    except ParameterError as cause:
         raise _shape_error((len(given),), m, times) from cause
 
 

@@ -1,16 +1,16 @@
 """Initial states by name, checked against the equations without inertia."""
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.by_name import by_name
-from halfdof_ctrl.base.doors import real_number, real_numbers
+from halfdof_ctrl.base.doors import is_mapping, real_number, real_numbers
 from halfdof_ctrl.base.errors import MatrixError
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.model.nonlinear import Values
+from halfdof_ctrl.nonlinear.equilibrium import Equilibrium
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 from halfdof_ctrl.nonlinear.recovery import motion_at
 from halfdof_ctrl.reduction.method.recovery import require_consistent
@@ -25,8 +25,9 @@ def initial_state(reduction: "NonlinearReduction", initial: Values, inputs: Valu
     N = len(reduction.states)
     if initial is None:
         initial = {}
-    if not isinstance(initial, Mapping):
-        x = real_numbers(getattr(initial, "state", initial), "initial", "a state, or a mapping from names to numbers")
+    if not is_mapping(initial):
+        given = initial.state if isinstance(initial, Equilibrium) else initial
+        x = real_numbers(given, "initial", "a state, or a mapping from names to numbers")
         if x.ndim == 0 and N:
             x = np.full(N, float(x))
         if x.shape != (N,) or not np.isfinite(x).all():

@@ -10,7 +10,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.errors import InconsistentStateError
 from halfdof_ctrl.nonlinear.small_motion import feedback_of_elements
-from halfdof_ctrl.reduction.method.recovery import RecoveredMotion, forward_slope
+from halfdof_ctrl.reduction.method.recovery import RecoveredMotion, forward_slope, require_response
 
 if TYPE_CHECKING:
     from halfdof_ctrl.nonlinear.reduction import NonlinearReduction
@@ -40,7 +40,8 @@ def motion_at(
 
 def recovered(reduction: "NonlinearReduction", response: Any) -> RecoveredMotion:  # noqa: ANN401  # TimeResponseData
     """Return displacements and velocities of all DOFs for a time response of this model."""
-    x = np.asarray(response.states if response.x is None else response.x, dtype=float)
+    require_response(response)
+    x = np.asarray(response.x, dtype=float)
     time = np.asarray(response.t, dtype=float)
     m, N = len(reduction.model.inputs), len(reduction.states)
     u = np.zeros((m, time.size)) if response.u is None else np.asarray(response.u, dtype=float).reshape(-1, time.size)

@@ -9,6 +9,7 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.nonlinear import Values
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.nonlinear.classification import partition_of
+from halfdof_ctrl.nonlinear.equilibrium import Equilibrium
 from halfdof_ctrl.nonlinear.given_inputs import constant_inputs
 from halfdof_ctrl.nonlinear.initial import initial_state
 from halfdof_ctrl.nonlinear.small_motion import infinite_slope
@@ -19,8 +20,8 @@ if TYPE_CHECKING:
 
 def tangent_model(reduction: "NonlinearReduction", state: Any, inputs: Values) -> SecondOrderModel:  # noqa: ANN401
     """Return the tangent, as `NonlinearModel.tangent` describes it."""
-    if inputs is None:
-        inputs = getattr(state, "inputs", None)
+    if inputs is None and isinstance(state, Equilibrium):
+        inputs = state.inputs
     u = constant_inputs(inputs, reduction.model.inputs)
     x = initial_state(reduction, state, u)
     w, _ = reduction.solved(0.0, x, u)

@@ -18,7 +18,7 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import LARGEST_SIZE, SMALLEST_SIZE
 from halfdof_ctrl.base.by_name import by_name
-from halfdof_ctrl.base.doors import is_real_number, shown
+from halfdof_ctrl.base.doors import is_mapping, is_real_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import as_tuple, listed
 from halfdof_ctrl.model.mechss import mechss
@@ -58,18 +58,18 @@ def part_axes(axes: Axes, **sizes: object) -> tuple[str, ...]:
     >>> part_axes(None, k={"x": 1.0, "z": 2.0}), part_axes("xyz"), part_axes(None, k=3.0)
     (('x', 'z'), ('x', 'y', 'z'), ('',))
     """
-    by_axis = {symbol: tuple(value) for symbol, value in sizes.items() if isinstance(value, Mapping)}
+    by_axis = {symbol: tuple(value) for symbol, value in sizes.items() if is_mapping(value)}
     found = next(iter(by_axis.values()), ("",)) if axes is None else _split(axes)
     wrong = [axis for axis in found if axis not in LINKS_AXES and found != ("",)]
     if wrong or not found or len(set(found)) != len(found):
-        msg = (
-            f"axes = {axes if axes is not None else found!r}: each must be one of {listed(LINKS_AXES)}, and stand once."
-        )
+        told = shown(found if axes is None else axes)
+        msg = f"axes = {told}: each must be one of {listed(LINKS_AXES)}, and stand once."
         raise ParameterError(msg, parameter="axes", value=axes)
     for symbol, keys in by_axis.items():
         if set(keys) != set(found):
+            told = listed([str(key) for key in keys]) or "no axis"
             msg = (
-                f"{symbol} is given for {listed(keys) or 'no axis'}, but the part has the axes {listed(found)}. "
+                f"{symbol} is given for {told}, but the part has the axes {listed(found)}. "
                 "Give one number for each of them, 0 where nothing acts."
             )
             raise ParameterError(msg, parameter=symbol, value=sizes[symbol])
@@ -96,7 +96,7 @@ def sized(
     ParameterError
         Negative, NaN, Inf or no number.
     """
-    sizes = by_name(value, axes, "axis") if isinstance(value, Mapping) else dict.fromkeys(axes, value)
+    sizes = by_name(value, axes, "axis") if is_mapping(value) else dict.fromkeys(axes, value)
     return {axis: checked(sizes[axis], symbol, unit, positive=positive) for axis in axes}
 
 

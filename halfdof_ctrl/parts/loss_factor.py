@@ -23,7 +23,7 @@ import scipy.linalg
 from scipy.sparse import csc_array, diags_array, kron
 
 from halfdof_ctrl.base.arrays import FloatArray, Matrix, read_only
-from halfdof_ctrl.base.doors import answer_of, is_choice, is_real_number, real_numbers, shown
+from halfdof_ctrl.base.doors import answer_of, is_choice, is_real_number, is_whole_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ComplexModelError, ParameterError
 from halfdof_ctrl.base.names import DERIVATIVE_SUFFIXES, listed
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse, joined_sparse, sparse_zeros
@@ -188,7 +188,7 @@ def _what_is_lost(
 
 
 def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> tuple[Loss, bool]:
-    if isinstance(loss_factor, int | float | np.integer | np.floating) and not isinstance(loss_factor, bool):
+    if is_real_number(loss_factor):
         eta = _positive(loss_factor, "loss_factor", "")
         return lambda omega: np.full(np.shape(omega), eta), True
     loss = loss_factor if callable(loss_factor) else _tabulated(loss_factor, band)
@@ -212,8 +212,9 @@ def _loss_over_frequency(loss_factor: LossFactor, band: tuple[float, float]) -> 
 
 def _tabulated(table: object, band: tuple[float, float]) -> Loss:
     try:
-        f, eta = (np.asarray(column, dtype=float) for column in cast("Any", table))
-        sound = f.ndim == 1 and f.shape == eta.shape and f.size > 1 and bool((np.diff(f) > 0.0).all() and f[0] > 0.0)
+        f, eta = (real_numbers(column, "loss_factor", "real numbers") for column in cast("Any", table))
+        sound = f.ndim == 1 and f.shape == eta.shape and f.size > 1 and bool(np.isfinite(f).all() and f[0] > 0.0)
+        sound = sound and bool((f[1:] > f[:-1]).all())
         sound = sound and bool((eta > 0.0).all())
     except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
         sound = False
@@ -350,9 +351,7 @@ def _require_options(keep: Keep, branches: int | None, tol: float) -> None:
         msg = f"keep must be one of {listed(get_args(Keep))}, not {shown(keep)}."
         raise ParameterError(msg, parameter="keep", value=keep)
     if branches is not None and not (
-        is_real_number(branches)
-        and isinstance(branches, int | np.integer)
-        and 0 < branches <= LOSS_FACTOR_MOST_BRANCHES
+        is_real_number(branches) and is_whole_number(branches) and 0 < branches <= LOSS_FACTOR_MOST_BRANCHES
     ):
         msg = f"branches = {shown(branches)}, but it must be a whole number from 1 to {LOSS_FACTOR_MOST_BRANCHES}."
         raise ParameterError(msg, parameter="branches", value=branches)

@@ -106,7 +106,7 @@ def rigid_body(
     rows, names = [np.eye(len(LINKS_AXES))], list(LINKS_AXES)
     require_mapping({} if points is None else points, "points", "from names to places (x, y, z) [m]")
     require_switch(rotations, "rotations")
-    for name, place in (points or {}).items():
+    for name, place in ({} if points is None else points).items():
         axes = LINKS_AXES if rotations else LINKS_AXES[:N_TRANSLATIONS]
         rows.append(_lever(name, place)[: len(axes)])
         names += [axis_name(name, axis) for axis in axes]

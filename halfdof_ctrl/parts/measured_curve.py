@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.doors import is_choice, is_real_number, shown
+from halfdof_ctrl.base.doors import is_choice, is_real_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import listed
 
@@ -96,7 +96,8 @@ def typical_scatter(values: npt.NDArray[np.inexact]) -> float:
 
 def _checked_points(frequency: npt.ArrayLike, stiffness: npt.ArrayLike) -> tuple[FloatArray, ComplexArray]:
     try:
-        f, K = np.array(frequency, dtype=float), np.array(stiffness, dtype=complex)
+        f = np.array(real_numbers(frequency, "frequency", "real numbers"))
+        K = np.array(stiffness, dtype=complex)
     except Exception as cause:
         msg = f"frequency must be a list of real numbers [Hz] and stiffness one of complex numbers: {cause}."
         raise ParameterError(msg, parameter="stiffness", value=None) from cause

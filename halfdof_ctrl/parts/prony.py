@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, read_only
-from halfdof_ctrl.base.doors import real_numbers, shown
+from halfdof_ctrl.base.doors import is_whole_number, real_numbers, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -172,7 +172,7 @@ def _most_branches(curve: MeasuredCurve, branches: int | None) -> int:
     points = curve.omega.size
     if branches is None:
         return min(MOST_BRANCHES, points - 1)
-    if isinstance(branches, bool) or not isinstance(branches, int | np.integer) or branches < 0:
+    if not is_whole_number(branches) or branches < 0:
         msg = f"branches = {shown(branches)}, but it must be a whole number, 0 or more."
         raise ParameterError(msg, parameter="branches", value=branches)
     unknowns = 2 * int(branches) + (1 if curve.static is None else 0)

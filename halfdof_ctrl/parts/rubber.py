@@ -20,7 +20,7 @@ of Nonlinear Viscoelastic Materials, 1976, chapter 5, has these four chains by t
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -245,12 +245,9 @@ def _branch(node: str, k: Size, c: Size, axes: tuple[str, ...], symbols: tuple[s
 
 
 def _pair(branch: object, number: int) -> tuple[Size, Size]:
-    if (
-        not isinstance(branch, Sequence | np.ndarray)
-        or isinstance(branch, str)
-        or np.ndim(branch) == 0
-        or len(branch) != PAIR
-    ):
+    listed = isinstance(branch, Sequence | np.ndarray) and not isinstance(branch, str)
+    pair: Any = branch if listed else ()
+    if getattr(pair, "shape", (PAIR,))[:1] != (PAIR,) or len(pair) != PAIR:
         msg = f"Branch {number} is {shown(branch)}, but each must be a pair (k_i [N/m], c_i [N s/m])."
         raise ParameterError(msg, parameter="branches", value=branch)
-    return branch[0], branch[1]
+    return pair[0], pair[1]

@@ -21,6 +21,7 @@ from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import name_from_label
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.plots.units import plain
+from halfdof_ctrl.systems.doors import require_finite_system
 
 AxesArray: TypeAlias = npt.NDArray[Any]  #: two-dimensional, of matplotlib Axes
 AxesLike: TypeAlias = Axes | Sequence[Axes] | npt.NDArray[Any] | None
@@ -66,10 +67,14 @@ def prepared_axes(
         return axes
     try:
         given = np.asarray(ax, dtype=object)
+        sound = all(isinstance(entry, Axes) for entry in given.flat)
     except Exception:  # noqa: BLE001  # the object is the user's, and so is what it raises
-        given = np.array(None)
-    if not all(isinstance(entry, Axes) for entry in given.flat):
+        sound = False
+    if not sound:
         msg = f"ax must be matplotlib Axes or an array of them, not {type(ax).__name__}: pass plt.subplots(...)[1]."
+        raise ParameterError(msg, parameter="ax", value=ax)
+    if not all(entry.figure is not None and entry.name == "rectilinear" for entry in given.flat):
+        msg = "ax must be Axes with straight x and y axes that are still in a figure: pass plt.subplots(...)[1]."
         raise ParameterError(msg, parameter="ax", value=ax)
     if given.shape != shape and not (given.ndim < 2 and min(shape) == 1 and given.size == max(shape)):  # noqa: PLR2004
         msg = (
@@ -132,6 +137,8 @@ def require_system(sysdata: object) -> None:
     ------
     ParameterError
         Anything else, such as a transfer function.
+    MatrixError
+        A state space with NaN or Inf.
     """
     if not isinstance(sysdata, control.StateSpace | SecondOrderModel):
         msg = (
@@ -139,6 +146,8 @@ def require_system(sysdata: object) -> None:
             "Convert it first, by mechss or control.ss."
         )
         raise ParameterError(msg, parameter="sysdata", value=sysdata)
+    if isinstance(sysdata, control.StateSpace):
+        require_finite_system(sysdata)
 
 
 def legend_prefix(label: str | None) -> str:

@@ -120,7 +120,7 @@ def dynamic_stiffness_plot(
     require_texts(title=title)
     require_switches(Hz=Hz, dB=dB, grid=grid)
     models, texts = _models(sysdata, label)
-    _require_scales(xscale or "linear", yscale)
+    _require_scales("linear" if xscale is None else xscale, yscale)
     if omega is None:
         given = motion_frequencies(models, dof, free=True)
         if xscale is None:

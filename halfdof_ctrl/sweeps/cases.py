@@ -163,7 +163,10 @@ def _sample(varied: dict[str, Values], fixed: dict[str, object]) -> Cases:
 
 def _columns(parameters: Iterable[object]) -> dict[str, Values]:
     """Turn a list of cases into a list of values for each parameter."""
-    rows = list(parameters) if isinstance(parameters, Iterable) and not isinstance(parameters, str | np.ndarray) else []
+    try:
+        rows = [] if isinstance(parameters, str | np.ndarray) else list(parameters)
+    except Exception:  # noqa: BLE001  # no collection, or one that fails
+        rows = []
     if not rows or not all(isinstance(row, Mapping) for row in rows):
         msg = (
             "parameters must be a mapping from names to lists of values, or a list of mappings with one value for each "

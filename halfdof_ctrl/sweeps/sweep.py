@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy.typing as npt
 
-from halfdof_ctrl.base.doors import is_choice, require_switches, shown
+from halfdof_ctrl.base.doors import is_choice, is_real_number, is_whole_number, require_path, require_switches, shown
 from halfdof_ctrl.base.errors import FailedCasesWarning, ParameterError, SweepInterruptedError, give_warning
 from halfdof_ctrl.base.names import Names
 from halfdof_ctrl.base.progress import progress_bar
@@ -198,9 +198,10 @@ def _checkpoint(path: str | os.PathLike[str] | None, plan: _Plan) -> Iterator[Ch
     if path is None:
         yield None
         return
-    if not isinstance(path, str | os.PathLike) or not os.fspath(path):
-        msg = f"checkpoint must be the path of a file, not {path!r}."
+    if not isinstance(path, str | os.PathLike) or path == "":
+        msg = f"checkpoint must be the path of a file, not {shown(path)}."
         raise ParameterError(msg, parameter="checkpoint", value=path)
+    require_path(path, "checkpoint", parameter="checkpoint")
     with open_checkpoint(path, fingerprint(**plan.facts), plan.about) as file:
         yield file
 
@@ -303,7 +304,7 @@ def _checked_workers(workers: object, executor: object) -> int | None:
     if executor is not None:
         msg = "workers is the number of processes to start here, but an executor brings its own. Give one of the two."
         raise ParameterError(msg, parameter="workers", value=workers)
-    if not isinstance(workers, int) or isinstance(workers, bool) or (workers < 1 and workers != EVERY_CORE):
+    if not is_whole_number(workers) or (workers < 1 and workers != EVERY_CORE):
         msg = f"workers = {shown(workers)}, but it must be a positive number of processes, or -1 for one a core."
         raise ParameterError(msg, parameter="workers", value=workers)
     return available_cores() if workers == EVERY_CORE else workers
@@ -311,8 +312,8 @@ def _checked_workers(workers: object, executor: object) -> int | None:
 
 def _checked_timeout(timeout: object, processes: int | None, executor: Executor | None) -> int:
     """Read the time of a case; give the number of processes that can keep to it."""
-    if isinstance(timeout, bool) or not isinstance(timeout, int | float) or not 0.0 < timeout < math.inf:
-        msg = f"timeout = {timeout!r}, but it must be a positive number of seconds."
+    if not (is_real_number(timeout) and 0.0 < float(timeout) < math.inf):  # type: ignore[arg-type]
+        msg = f"timeout = {shown(timeout)}, but it must be a positive number of seconds."
         raise ParameterError(msg, parameter="timeout", value=timeout)
     if executor is not None:
         msg = (

@@ -81,7 +81,7 @@ def transfer_of_both(
         measure = _measured(model, exact)
         differs = ~(np.abs(found.values - exact.values) <= DOUBTED * measure.value)
         for side, response in zip(sides, (exact, found), strict=True):
-            side.refine(response, differs.any(axis=0))
+            side.refine(response, np.asarray(differs.any(axis=0)))
     return exact, found
 
 
@@ -139,7 +139,7 @@ def _measured(model: SecondOrderModel, exact: RefinedResponse) -> _Measure:
     deep = DEEP * np.nan_to_num(size).max(axis=2, keepdims=True)
     value = np.where(is_zero, scale, np.maximum(np.maximum(size, NEARBY * exact.slope), deep))
     value = np.where(value > 0.0, value, 1.0)  # no response at all, or none determined
-    return _Measure(is_zero, scale, value, data)
+    return _Measure(np.asarray(is_zero), scale, value, data)
 
 
 def system_response(

@@ -15,6 +15,7 @@ from halfdof_ctrl.base.errors import (
     EnergyFormError,
     FileFormatError,
     HalfdofError,
+    HalfdofWarning,
     ImproperError,
     InconsistentStateError,
     LawError,
@@ -34,6 +35,8 @@ from halfdof_ctrl.base.errors import (
     WeightError,
     WorkerError,
     WrongObjectError,
+    give_warning,
+    recording_warnings,
 )
 from halfdof_ctrl.files.naming import naming_the_file
 
@@ -126,3 +129,12 @@ def test_a_missing_extra_stays_one_and_an_os_error_too() -> None:
         raise MissingExtraError("needs h5py", path="", extra="hdf5")
     with pytest.raises(FileNotFoundError), naming_the_file("a.mat"):
         raise FileNotFoundError
+
+
+def test_no_message_steers_a_terminal() -> None:
+    """Names come from files, and causes from objects of the user's: what a terminal obeys is written as an escape."""
+    assert str(HalfdofError("a\x1b[31m\nb")) == "a\\x1b[31m\nb"
+    assert str(pickle.loads(pickle.dumps(MatrixError("\x07", matrix="M")))) == "\\x07"  # noqa: S301  # our own
+    with recording_warnings() as caught:
+        give_warning("\x9b", HalfdofWarning)
+    assert caught[0].message == "\\x9b"

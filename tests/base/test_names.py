@@ -15,9 +15,9 @@ from halfdof_ctrl.base.names import (
     motion_names,
     motions,
     name_from_label,
-    printable,
     unknown_name_error,
 )
+from halfdof_ctrl.base.printable import printable
 
 
 @given(name=st.text(max_size=20))

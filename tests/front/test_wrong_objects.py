@@ -131,3 +131,49 @@ def test_a_feedback_comes_back_from_its_pickle() -> None:
     np.testing.assert_array_equal(again.K, feedback.K)
     assert isinstance(again.closed_loop, control.StateSpace)
     assert again.closed_loop.state_labels == feedback.closed_loop.state_labels
+
+
+@pytest.mark.parametrize("folder", [3, None, "\ud800", "a\0b", "/"])
+def test_a_folder_that_is_none_is_refused_before_anything_is_computed(folder: Any) -> None:  # noqa: ANN401
+    """By its name, and not by what `pathlib` says."""
+    with pytest.raises(
+        hd.HalfdofError, match=r"^write_report (takes the path of a folder|is .*no file system)|^/: .*Choose another"
+    ):
+        hd.write_report(hd.hydromount(), folder)
+
+
+@pytest.mark.parametrize("projection", ["polar", "removed"])
+def test_axes_that_cannot_take_a_plot_are_refused(projection: str) -> None:
+    """Round ones, and some that have left their figure."""
+    axes = plt.figure().add_subplot(projection="polar" if projection == "polar" else None)
+    if projection == "removed":
+        axes.remove()
+    with pytest.raises(hd.HalfdofError, match="straight x and y axes that are still in a figure"):
+        hd.pole_map_plot(hd.hydromount(), ax=axes)
+    plt.close("all")
+
+
+def test_messages_hold_no_addresses() -> None:
+    """An object without a text of its own is shown by its kind; where it lies changes from run to run."""
+    wrong: Any = lambda *_: None  # noqa: E731  # any object of this kind
+    with pytest.raises(hd.HalfdofError, match="function") as refusal:
+        hd.hydromount(m=wrong)
+    assert " at 0x" not in str(refusal.value)
+
+
+@pytest.mark.parametrize("given", [{"y": np.inf}, [np.inf, 0.0, 0.0]])
+def test_an_infinite_initial_value_is_refused(given: Any) -> None:  # noqa: ANN401
+    """NaN leaves a value open, and Inf says nothing."""
+    with pytest.raises(hd.HalfdofError, match="displacement is infinite at y"):
+        hd.exact_reduction(hd.hydromount()).state(given)
+
+
+def test_nothing_but_refusals_warns(table: Table) -> None:
+    """Complex numbers are not cut down to real ones, with a warning of NumPy's, where real ones are asked for."""
+    complex_numbers = np.array([1.0 + 1.0j, 2.0, 3.0])
+    for door, argument in (("equilibrium", "inputs"), ("slope of a table", "x"), ("fit_prony", "frequency")):
+        function, right = table[door]
+        with pytest.raises(hd.HalfdofError):
+            function(**{**right, argument: complex_numbers})
+    with pytest.raises(hd.HalfdofError):
+        hd.Law(np.sin, bounds=complex_numbers[:2])  # type: ignore[arg-type]

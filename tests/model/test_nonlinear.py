@@ -33,6 +33,48 @@ def test_the_mount_with_oil_prints_what_an_element_made_of_its_dofs() -> None:
     assert model.states == ("y", "y1", "y2", "y_dot")
 
 
+CHAIN = hd.mechss(np.diag([3.0, 2.0, 1.0]), None, 5.0 * np.eye(3), dofs=["a", "b", "c"])
+
+
+def test_without_a_dof_its_elements_end_at_the_ground() -> None:
+    """What held at rest means for each: the far end becomes the ground, a number is turned round, two ends vanish."""
+    cubic = laws.cubic(7.0)
+    elements = [
+        Spring("a", "b", cubic),
+        Damper("c", "b", 2.0),
+        Damper("b", "c", laws.quadratic(3.0)),
+        Spring("c", None, cubic),
+    ]
+    left = nlmechss(CHAIN, elements).without("c")
+    assert left.dofs == ("a", "b")
+    assert list(map(repr, left.elements)) == [
+        'Spring("a", "b", law=cubic(7))',
+        'Damper("b", law=2)',
+        'Damper("b", law=quadratic(3))',
+    ]
+    np.testing.assert_array_equal(left.with_linear_elements.C, np.diag([0.0, 2.0]))
+    np.testing.assert_array_equal(left.linear.K, CHAIN.without("c").K)
+
+
+def test_without_a_dof_the_tangent_is_that_with_the_dof_at_rest() -> None:
+    """A cubic spring of 4 and 7 from b to c, b at 0.7: 5 + 4 + 3 7 0.49 N/m at b, whether c is at rest or left out."""
+    model = nlmechss(CHAIN, [Spring("b", "c", laws.cubic(7.0, 4.0)), Damper("b", None, 0.5)])
+    whole, left = model.tangent({"b": 0.7}), model.without(["a", "c"]).tangent({"b": 0.7})
+    assert whole.K[1, 1] == pytest.approx(5.0 + 4.0 + 21.0 * 0.49, rel=1e-14)
+    np.testing.assert_array_equal(left.K, whole.K[1:2, 1:2])
+    np.testing.assert_array_equal(left.C, [[0.5]])
+
+
+def test_an_element_that_cannot_lose_its_dof_is_named() -> None:
+    """A law that begins at the DOF may differ the other way round; a force knows what it is a function of."""
+    with pytest.raises(SignalNameError, match=r"spring 1 \(gap\) begins at c, which is taken out.*from b to c"):
+        nlmechss(CHAIN, Spring("c", "b", laws.gap(1.0, 0.1))).without("c")
+    with pytest.raises(SignalNameError, match=r"force 1 .* knows c, which cannot be taken out"):
+        nlmechss(CHAIN, Force(lambda q, v, t: q, ["b", "c"])).without("c")
+    with pytest.raises(SignalNameError, match="The model has no DOF 'd'"):
+        nlmechss(CHAIN, Spring("c", "b", 1.0)).without("d")
+
+
 def test_select_keeps_the_elements() -> None:
     """Signals by name as in the linear model."""
     model = nlmechss(MOUNT, Damper("y2", law=laws.quadratic(1e4)))

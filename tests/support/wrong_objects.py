@@ -21,10 +21,22 @@ class Nothing:
     """An object that can do nothing."""
 
 
+class Lost:
+    """A path that leads nowhere."""
+
+    def __fspath__(self) -> str:
+        """Fail."""
+        message = "there is no way"
+        raise RuntimeError(message)
+
+
 def wrong_objects() -> dict[str, object]:
     """Give what is passed by mistake, by what it is, made anew."""
     mount = hd.hydromount().select("F_y", "y")
     system = hd.mech2ss(mount)
+    broken = control.ss([[np.nan]], [[1.0]], [[1.0]], [[0.0]])
+    in_itself: list[object] = []
+    in_itself.append(in_itself)
     return {
         "none": None,
         "true": True,
@@ -40,6 +52,8 @@ def wrong_objects() -> dict[str, object]:
         "numpy integer": np.int64(3),
         "fraction": fractions.Fraction(1, 3),
         "decimal": decimal.Decimal("0.1"),
+        "decimal that compares with nothing": decimal.Decimal("sNaN"),
+        "span of time, an integer of numpy": np.timedelta64(3, "s"),
         "empty text": "",
         "text": "nope",
         "number as text": "20",
@@ -47,6 +61,7 @@ def wrong_objects() -> dict[str, object]:
         "control characters": "\x1b[31m\n",
         "bytes": b"abc",
         "path": pathlib.Path("nowhere/at/all"),
+        "path that fails": Lost(),
         "file": io.StringIO("1 2 3"),
         "empty list": [],
         "list of numbers": [1.0, 2.0, 3.0],
@@ -76,6 +91,8 @@ def wrong_objects() -> dict[str, object]:
         "boolean array": np.array([True, False]),
         "masked": np.ma.masked_array([1.0, 2.0], mask=[True, False]),
         "sparse": sparse.csr_array(np.eye(3)),
+        "sparse that is a mapping": sparse.dok_array((2, 2)),
+        "in itself": in_itself,
         "date": np.datetime64("2020-01-01"),
         "time": dt.timedelta(1),
         "object": Nothing(),
@@ -89,6 +106,7 @@ def wrong_objects() -> dict[str, object]:
         "state space": system,
         "transfer function": control.tf([1.0], [1.0, 1.0]),
         "frequency response": control.frd([1.0, 2.0], [1.0, 2.0]),
+        "state space with NaN": broken,
         "discrete": control.ss(0.5, 1.0, 1.0, 0.0, 0.1),
         "model": mount,
         "reduction": hd.exact_reduction(mount),
@@ -366,6 +384,19 @@ def doors(folder: pathlib.Path) -> dict[str, tuple[Callable[..., object], dict[s
         "dynamic_stiffness_plot": (hd.dynamic_stiffness_plot, {"sysdata": two, "dof": "a", "omega": omega}),
         "transmissibility_plot": (hd.transmissibility_plot, {"sysdata": two, "from_": "a", "to": "b", "omega": omega}),
         "write_report": (hd.write_report, {"model": None, "folder": folder / "report"}),
+        "recover of a nonlinear model": (
+            soft.recover,
+            {"response": control.step_response(hd.mech2ss(hd.hydromount()))},
+        ),
+        "tangent": (soft.tangent, {"state": None, "inputs": None}),
+        "equilibrium": (soft.equilibrium, {"inputs": None}),
+        "state of a nonlinear model": (soft.state, {"initial": None, "inputs": None}),
+        "without": (two.without, {"dofs": "a"}),
+        "without of a nonlinear model": (soft.without, {"dofs": "y1"}),
+        "table": (hd.laws.table, {"x": [0.0, 1.0], "f": [0.0, 1.0], "extend": None}),
+        "slope of a table": (hd.laws.table([0.0, 1.0], [0.0, 1.0]).slope, {"x": 0.5}),
+        "cubic": (hd.laws.cubic, {"k3": 1.0, "k1": 0.0}),
+        "motion": (reduction.motion, {"derivative": 0}),
         "select": (two.select, {"inputs": "F_a", "outputs": "b"}),
         "prescribe_motion": (
             two.prescribe_motion,
@@ -443,6 +474,16 @@ DOORS = (
     "dynamic_stiffness_plot",
     "transmissibility_plot",
     "write_report",
+    "recover of a nonlinear model",
+    "tangent",
+    "equilibrium",
+    "state of a nonlinear model",
+    "without",
+    "without of a nonlinear model",
+    "table",
+    "slope of a table",
+    "cubic",
+    "motion",
     "select",
     "prescribe_motion",
     "transfer function of a model",

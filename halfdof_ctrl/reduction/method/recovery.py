@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import FloatArray
 from halfdof_ctrl.base.by_name import by_name
-from halfdof_ctrl.base.doors import real_number, real_numbers, shown, wrong_object
+from halfdof_ctrl.base.doors import is_mapping, real_number, real_numbers, shown, wrong_object
 from halfdof_ctrl.base.errors import InconsistentStateError, MatrixError, ParameterError
-from halfdof_ctrl.base.names import motion_names, unknown_name_error
+from halfdof_ctrl.base.names import listed, motion_names, unknown_name_error
 
 CONSISTENT = 1e-9  #: given initial values may differ by this part of the largest of their kind
 
@@ -82,14 +82,18 @@ def given_inputs(given: npt.ArrayLike, count: int) -> FloatArray:
 
 def given_values(given: npt.ArrayLike | Mapping[str, float], dofs: tuple[str, ...], what: str) -> FloatArray:
     """Read displacements or velocities as an array with NaN where they are open."""
-    if isinstance(given, Mapping):
+    if is_mapping(given):
         values = np.full(len(dofs), np.nan)
         for name, value in by_name(given, dofs, "DOF").items():
             values[dofs.index(name)] = real_number(value, f"{what} of {name}")
-        return values
-    values = real_numbers(given, what, f"one real number for each of the {len(dofs)} DOFs")
+    else:
+        values = real_numbers(given, what, f"one real number for each of the {len(dofs)} DOFs")
     if values.shape != (len(dofs),):
         msg = f"{what} must have one value for each of the {len(dofs)} DOFs, but its shape is {values.shape}."
+        raise MatrixError(msg, matrix=what)
+    if np.isinf(values).any():
+        places = np.flatnonzero(np.isinf(values)).tolist()
+        msg = f"{what} is infinite at {listed([dofs[place] for place in places])}. Give finite numbers."
         raise MatrixError(msg, matrix=what)
     return values
 

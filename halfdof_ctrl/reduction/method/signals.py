@@ -13,7 +13,7 @@ from itertools import zip_longest
 import numpy as np
 
 from halfdof_ctrl.base.arrays import FloatArray, is_zero, unit_matrix
-from halfdof_ctrl.base.doors import shown
+from halfdof_ctrl.base.doors import is_whole_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -62,7 +62,7 @@ class StateEquations:
         ParameterError
             `derivative` is no whole number from 0 to 20.
         """
-        if not isinstance(derivative, int | np.integer) or not 0 <= derivative <= HIGHEST_DERIVATIVE:
+        if not is_whole_number(derivative) or not 0 <= derivative <= HIGHEST_DERIVATIVE:
             msg = f"derivative = {shown(derivative)}, but it must be a whole number from 0 to {HIGHEST_DERIVATIVE}."
             raise ParameterError(msg, parameter="derivative", value=derivative)
         signal = self.displacement

@@ -22,7 +22,7 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
 from halfdof_ctrl.base.digits import digits_in_words
-from halfdof_ctrl.base.doors import is_real_number, shown
+from halfdof_ctrl.base.doors import is_real_number, is_whole_number, shown
 from halfdof_ctrl.base.errors import (
     ComplexModelError,
     MatrixError,
@@ -207,10 +207,10 @@ def _require_band(f_max: float | None, n_modes: int | None, points: int) -> None
     if f_max is not None and not (is_real_number(f_max) and np.isfinite(float(f_max)) and f_max > 0.0):
         msg = f"f_max = {shown(f_max)} Hz, but it must be a positive frequency."
         raise ParameterError(msg, parameter="f_max", value=f_max)
-    if n_modes is not None and not (isinstance(n_modes, int | np.integer) and n_modes > 0):
+    if n_modes is not None and not (is_whole_number(n_modes) and n_modes > 0):
         msg = f"n_modes = {shown(n_modes)}, but it must be a whole number, at least 1."
         raise ParameterError(msg, parameter="n_modes", value=n_modes)
-    if not isinstance(points, int | np.integer) or not 1 <= points <= MOST_POINTS:
+    if not is_whole_number(points) or not 1 <= points <= MOST_POINTS:
         msg = f"points = {shown(points)}, but the error is to be measured at a whole number of frequencies, 1 to 1e6."
         raise ParameterError(msg, parameter="points", value=points)
 
@@ -263,7 +263,8 @@ def _measured(
         desired[:, :, k] = full.at(point)
         limit.append(full.limit.of_entries_known_to(model.known_to).data)
     sound = np.isfinite(found) & np.isfinite(desired)
-    difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
+    found, desired = (np.where(sound, part, 0.0) for part in (found, desired))  # no infinity less another
+    difference, size = np.abs(found - desired), np.abs(desired)
     errors, data = (_relative(part, size) for part in (difference, np.where(sound, np.stack(limit, axis=2), 0.0)))
     fields = {letter: getattr(small, letter) for letter in LETTERS}
     truncated = TruncatedModel(
@@ -376,7 +377,8 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
     s = 2j * np.pi * frequencies
     found, desired = fewer(s, squeeze=False), small(s, squeeze=False)
     sound = np.isfinite(found) & np.isfinite(desired)
-    difference, size = (np.where(sound, np.abs(part), 0.0) for part in (found - desired, desired))
+    found, desired = (np.where(sound, part, 0.0) for part in (found, desired))  # no infinity less another
+    difference, size = np.abs(found - desired), np.abs(desired)
     expected = _relative(difference, size).max(axis=(0, 1))
     peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
     return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL_POINTS]]])
