@@ -20,6 +20,7 @@ import scipy.linalg
 import scipy.special
 
 from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
+from halfdof_ctrl.base.dense_lu import lu_factors
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -152,7 +153,7 @@ class RadauStep:
         down, across = scaling_powers(np.abs(E) + h * np.abs(A))
         rows, columns = down[:, None], across[:, None]
         even = [rows * E * columns.T, -rows * A * columns.T]
-        factors = [scipy.linalg.lu_factor(even[0] + h * mode.eigenvalue * even[1]) for mode in _modes()]
+        factors = [lu_factors(even[0] + h * mode.eigenvalue * even[1]) for mode in _modes()]
         return cls(h, A, rows, columns, tuple(factors), ExactPolynomial([as_it_is(part) for part in even]))
 
     def advance(self, x: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -160,9 +161,10 @@ class RadauStep:
         right = (self.rows * (self.A @ x + b)).astype(np.complex128)
         change, slope = np.zeros_like(x), np.zeros_like(x)
         for mode, factor in zip(_modes(), self.factors, strict=True):
-            part = scipy.linalg.lu_solve(factor, right)
+            part = scipy.linalg.lu_solve(factor, right, check_finite=False)
             for _ in range(REFINEMENTS if len(self.A) <= MOST_REFINED else 0):
-                part += scipy.linalg.lu_solve(factor, self.exact.residual(self.h * mode.eigenvalue, part, right))
+                residual = self.exact.residual(self.h * mode.eigenvalue, part, right)
+                part += scipy.linalg.lu_solve(factor, residual, check_finite=False)
             part *= self.columns
             change += (mode.to_change * part).real
             slope += (mode.to_slope * part).real

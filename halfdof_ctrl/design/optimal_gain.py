@@ -50,6 +50,7 @@ class OptimalGain:
     poles: ComplexArray  #: (N,) of the closed loop [rad/s]
 
 
+@np.errstate(all="ignore")  # what overflows is refused, with the size of its error
 def optimal_gain(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights | None, method: Solver) -> OptimalGain:
     """Solve the Riccati equation, and accept the gain only if it stabilizes and is known well enough.
 

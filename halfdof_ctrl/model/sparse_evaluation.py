@@ -300,7 +300,7 @@ class PointFactors:
     def growth(self) -> float:
         """Return the size of ``P(s)^-1 r`` for a random r of size one, in the units in which P(s) is even."""
         right = np.random.default_rng(0).uniform(1.0, 2.0, self.matrix.shape[0]).astype(np.complex128)
-        size = float(np.abs(self.lu.solve(right)).max())
+        size = float(np.abs(self.lu.solve(right)).max(initial=0.0))
         return size if np.isfinite(size) else np.inf
 
     def _residual(self, right: ComplexArray, solution: ComplexArray) -> tuple[ComplexArray, float]:

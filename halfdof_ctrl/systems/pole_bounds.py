@@ -18,6 +18,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
+from halfdof_ctrl.base.dense_lu import lu_factors
 from halfdof_ctrl.base.double_double import added, matrix_product, two_product
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.systems.pole_clusters import clusters
@@ -137,7 +138,7 @@ def _iterated(
     for _ in range(STEPS):
         shift = value + UNIT_ROUNDOFF * np.linalg.norm(A, 1) if value == 0.0 else value
         with np.errstate(all="ignore"):
-            factors = scipy.linalg.lu_factor(A - shift * unit, check_finite=False)
+            factors = lu_factors(A - shift * unit)
             v_new = scipy.linalg.lu_solve(factors, v, check_finite=False)
             w_new = scipy.linalg.lu_solve(factors, w, trans=2, check_finite=False)
             v_new, w_new = v_new / np.linalg.norm(v_new), w_new / np.linalg.norm(w_new)

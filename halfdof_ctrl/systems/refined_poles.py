@@ -16,6 +16,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.dense_lu import lu_factors
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.spectrum import balanced
 
@@ -97,7 +98,7 @@ def _iterate(
     """Find the vectors of one eigenvalue anew by inverse iteration from both sides, and correct it once more."""
     values, bounds = found
     start = np.random.default_rng(0).standard_normal((len(A), 1)).astype(np.complex128)
-    factors = scipy.linalg.lu_factor(A - values[place] * np.eye(len(A)), check_finite=False)
+    factors = lu_factors(A - values[place] * np.eye(len(A)))
     v, w = start, start
     for _ in range(2):
         v = np.asarray(scipy.linalg.lu_solve(factors, v / np.linalg.norm(v), check_finite=False))

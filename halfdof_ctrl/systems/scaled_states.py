@@ -11,6 +11,7 @@ import numpy.typing as npt
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import FloatArray, IndexArray
+from halfdof_ctrl.base.dense_lu import lu_factors
 
 MOST_SWEEPS = 50  #: through all DOFs; some ten are enough
 SETTLED_EXPONENT = 0.25  #: a change of an exponent by less is none
@@ -92,7 +93,7 @@ def _slowest(A: FloatArray, exponents: FloatArray, time: float) -> float:
     """Return log2 of the size of the slowest mode, by the power method on the inverse; at least time - DEEPEST."""
     scale = 2.0**exponents
     shift = 2.0 ** (time - DEEPEST_SCALE)
-    factors = scipy.linalg.lu_factor(A * scale / scale[:, None] - shift * np.eye(len(A)), check_finite=False)
+    factors = lu_factors(A * scale / scale[:, None] - shift * np.eye(len(A)))
     x = np.random.default_rng(0).standard_normal(len(A))
     growth = []
     for _ in range(POWER_STEPS):

@@ -38,6 +38,7 @@ EVEN_TIMES = 1e-6  #: relative differences between time steps that are rounding
 MOST_TIMED = 200  #: DOFs of a sparse model up to which times are chosen for all of them, not only for outputs
 
 
+@np.errstate(all="ignore")  # an unstable motion grows beyond all numbers, and is refused then
 def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None) -> control.TimeResponseData:
     """Compute the response to a unit step of each input, from rest.
 
@@ -79,6 +80,7 @@ def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None)
     return plant.data(time, outputs, states, inputs, "Step response", trace_labels=labels)
 
 
+@np.errstate(all="ignore")  # an unstable motion grows beyond all numbers, and is refused then
 def initial_response(
     model: SecondOrderModel,
     timepts: npt.ArrayLike | None = None,
@@ -126,6 +128,7 @@ def initial_response(
     return plant.data(time, outputs, states, inputs, "Initial response")
 
 
+@np.errstate(all="ignore")  # an unstable motion grows beyond all numbers, and is refused then
 def forced_response(
     model: SecondOrderModel,
     timepts: npt.ArrayLike,
@@ -256,6 +259,13 @@ class _Plant:
     ) -> control.TimeResponseData:
         """Pack a response with the names of the model."""
         model = self.model
+        bad = ~np.isfinite(np.vstack([part.reshape(-1, time.size) for part in (outputs, states)])).all(axis=0)
+        if bad.any():
+            msg = (
+                f"The response is beyond the largest number from t = {time[bad][0]:.4g} s on: the model is unstable. "
+                "Give a shorter time."
+            )
+            raise ParameterError(msg, parameter="timepts", value=float(time[bad][0]))
         name = control_label(model.name) if model.name else None
         several = {} if trace_labels is None else {"trace_labels": trace_labels, "trace_types": ["step"] * len(inputs)}
         return control.TimeResponseData(

@@ -11,6 +11,7 @@ import control
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 import halfdof_ctrl as hd
 from support.wrong_objects import DOORS, doors, wrong_objects
@@ -177,3 +178,26 @@ def test_nothing_but_refusals_warns(table: Table) -> None:
             function(**{**right, argument: complex_numbers})
     with pytest.raises(hd.HalfdofError):
         hd.Law(np.sin, bounds=complex_numbers[:2])  # type: ignore[arg-type]
+
+
+def test_a_motion_beyond_the_largest_number_is_refused_where_it_begins() -> None:
+    """``exp(1000 t)`` is beyond 1.8e308 from t = 0.71 on."""
+    unstable = hd.mechss([[1.0]], None, [[-1e6]])
+    said = r"beyond the largest number from t = 0\.7\d* s on: the model is unstable"
+    with pytest.raises(hd.HalfdofError, match=said):
+        hd.forced_response(unstable, np.linspace(0.0, 2.0, 201), 1.0)
+    with pytest.raises(hd.HalfdofError, match=said):
+        hd.initial_response(unstable, np.linspace(0.0, 2.0, 201), displacement={"q0": 1.0})
+
+
+def test_modes_of_what_is_not_semidefinite_are_no_numpy_error() -> None:
+    """A spring of -4 N/m under 1 kg falls over at exp(2 t) and swings at no frequency."""
+    small = hd.truncate_modes(hd.mechss([[1.0]], None, [[-4.0]]), n_modes=1)
+    np.testing.assert_allclose(small(1j), -1.0 / 5.0, rtol=1e-14)
+
+
+def test_the_stiffness_of_a_sparse_model_of_one_dof_needs_no_solve() -> None:
+    """2 N/m and 1 kg: ``2 - w^2`` at the DOF that is moved."""
+    one = csr_array(np.ones((1, 1)))
+    found = hd.dynamic_stiffness_response(hd.mechss(one, None, 2.0 * one), "q0", [1.0, 2.0])
+    np.testing.assert_allclose(found.complex.reshape(-1), [1.0, -2.0], rtol=1e-14)

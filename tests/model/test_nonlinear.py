@@ -19,6 +19,7 @@ from halfdof_ctrl.errors import (
     ParameterError,
     SignalNameError,
 )
+from halfdof_ctrl.model.elements import Element
 
 MOUNT = hd.hydromount(C_h=0)
 
@@ -39,7 +40,7 @@ CHAIN = hd.mechss(np.diag([3.0, 2.0, 1.0]), None, 5.0 * np.eye(3), dofs=["a", "b
 def test_without_a_dof_its_elements_end_at_the_ground() -> None:
     """What held at rest means for each: the far end becomes the ground, a number is turned round, two ends vanish."""
     cubic = laws.cubic(7.0)
-    elements = [
+    elements: list[Element] = [
         Spring("a", "b", cubic),
         Damper("c", "b", 2.0),
         Damper("b", "c", laws.quadratic(3.0)),

@@ -59,6 +59,7 @@ class ResonanceErrors:
     in_band: int  #: resonances that there are, the lowest and the highest of which were checked if k is smaller
 
 
+@np.errstate(all="ignore")  # a form without definiteness has motions without energy
 def resonance_errors(
     parts: dict[str, SparseMatrix], small: SecondOrderModel, basis: FloatArray, band: tuple[float, float]
 ) -> ResonanceErrors:
@@ -127,7 +128,8 @@ def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[Com
     size = np.abs(np.diagonal(small.K)) + scale**2 * np.abs(np.diagonal(small.M))
     units = 1.0 / np.sqrt(np.where(size > 0.0, size, 1.0))
     K, C, M = (np.asarray(part) * units * units[:, None] for part in (small.K, scale * small.C, scale**2 * small.M))
-    relative, vectors = _undamped_roots(K, M) if not (C.any() or np.iscomplexobj(K)) else _damped_roots(K, C, M)
+    undamped = None if C.any() or np.iscomplexobj(K) else _undamped_roots(K, M)
+    relative, vectors = _damped_roots(K, C, M) if undamped is None else undamped
     with np.errstate(divide="ignore", invalid="ignore"):
         values = scale * relative
         frequency = np.abs(values) / (2.0 * np.pi)
@@ -137,9 +139,12 @@ def _resonances(small: SecondOrderModel, band: tuple[float, float]) -> tuple[Com
     return values[inside], units[:, None] * vectors[:, inside]
 
 
-def _undamped_roots(K: FloatArray, M: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Return j omega and the modes of a semidefinite pair, in units in which the band ends at 1."""
-    parts, vectors = scipy.linalg.eigh((M + M.T) / 2.0, (K + K.T) / 2.0 + MASS_SHIFT * (M + M.T) / 2.0)
+def _undamped_roots(K: FloatArray, M: FloatArray) -> tuple[ComplexArray, ComplexArray] | None:
+    """Return j omega and the modes of a pair, in units in which the band ends at 1; None if it is not semidefinite."""
+    try:
+        parts, vectors = scipy.linalg.eigh((M + M.T) / 2.0, (K + K.T) / 2.0 + MASS_SHIFT * (M + M.T) / 2.0)
+    except np.linalg.LinAlgError:
+        return None
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         squares = np.where(parts > 0.0, 1.0 / parts - MASS_SHIFT, np.inf)
         values = 1j * np.sqrt(np.maximum(squares, 0.0))
