@@ -66,7 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")
     try:
         with orderly_end(), asked_output_only(), _warnings_on_stderr() as caught:
-            arguments = _parser().parse_args(argv)
+            arguments = _parsed(sys.argv[1:] if argv is None else argv)
             command: Callable[[argparse.Namespace], int] = arguments.command
             without_windows()
             with activity(f"{PROGRAM} {getattr(arguments, 'name', '')}".strip()):
@@ -140,6 +140,15 @@ class _Once(argparse.Action):
             parser.error(f"{option_string} is given twice")
         given.add(self.dest)
         setattr(namespace, self.dest, values)
+
+
+def _parsed(given: Sequence[str]) -> argparse.Namespace:
+    """Read the arguments; ``--option=--`` is refused, of which argparse makes a list without entries."""
+    parser = _parser()
+    for text in given:
+        if text.startswith("-") and text.endswith("=--"):
+            parser.error(f"argument {text[:-3]}: expected one argument, not --")
+    return parser.parse_args(given)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -13,13 +13,14 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 Step = TypeVar("Step")
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
 
 DELAY = 1.0  #: [s] before a bar appears
+USUAL_SIZE = {"ncols": 80, "nrows": 24}  #: of a terminal that does not say its own, on which tqdm would draw nothing
 TICK = 0.5  #: [s] between two looks at the clock
 
 _SILENT: ContextVar[bool] = ContextVar("_SILENT", default=False)
@@ -83,7 +84,8 @@ def progress_bar(total: int | None, what: str, *, show: bool | None = None) -> I
     from tqdm import tqdm  # noqa: PLC0415  # costs time, which a bare import of the package does not need
 
     switch = {"disable": True} if _is_hidden(show) else {}  # otherwise left to the user, who may have set TQDM_DISABLE
-    with _instead_of_the_clock(), tqdm(total=total, desc=what, delay=DELAY, file=sys.stderr, **switch) as bar:
+    drawn = {"desc": what, "delay": DELAY, "file": sys.stderr} | _size()
+    with _instead_of_the_clock(), tqdm(total=total, **drawn, **switch) as bar:
 
         def advance(steps: int) -> None:
             bar.update(steps)
@@ -218,6 +220,14 @@ def silence() -> Iterator[None]:
 
 def _is_hidden(show: bool | None) -> bool:  # noqa: FBT001  # as the functions above have it
     return _SILENT.get() or sys.stderr is None or not (_is_watched() if show is None else show)
+
+
+def _size() -> dict[str, Any]:
+    """Return the size to draw in where a terminal says that it has none; otherwise tqdm finds it."""
+    try:
+        return {} if os.get_terminal_size(sys.stderr.fileno()).columns else USUAL_SIZE
+    except (AttributeError, OSError, ValueError):  # no terminal
+        return {}
 
 
 def _is_watched() -> bool:

@@ -1,5 +1,6 @@
 """Progress is shown to somebody who watches, and to nobody else."""
 
+import os
 import sys
 import time
 from collections.abc import Iterator
@@ -163,3 +164,19 @@ def test_an_activity_that_nobody_watches_is_not_shown(
         assert slow(x=4) == 4
     assert slow.__doc__ == "Take some time."
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pseudo-terminals are POSIX's")
+def test_a_terminal_without_a_size_shows_what_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As one that a program or a container opens: tqdm alone would draw nothing on it."""
+    parent, child = os.openpty()
+    with os.fdopen(child, "w") as stream, monkeypatch.context() as patch:
+        patch.setattr(sys, "stderr", stream)
+        assert sum(progress([1, 2, 3], "frequencies")) == 6
+        stream.write("the end")
+        stream.flush()
+        shown = b""
+        while b"the end" not in shown:
+            shown += os.read(parent, 4096)
+    os.close(parent)
+    assert b"frequencies: 100%" in shown

@@ -511,3 +511,12 @@ def test_a_response_beyond_the_largest_number_is_refused(target: str, capsys: py
     assert main(["step", "unstable.npz", "--time", "1e6", "-o", target]) == 2
     assert "beyond the largest number" in capsys.readouterr().err
     assert not Path(target).exists()
+
+
+@pytest.mark.parametrize("option", ["--omega-min", "--f-max", "--points"])
+def test_two_dashes_are_no_value(option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Argparse makes a list without entries of ``--points=--``."""
+    with pytest.raises(SystemExit) as end:
+        main(["bode", "hydromount", "-o", str(tmp_path / "b.csv"), f"{option}=--"])
+    assert end.value.code == 2
+    assert f"error: argument {option}: expected one argument" in capsys.readouterr().err
