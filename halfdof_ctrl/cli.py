@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, NoReturn
 from halfdof_ctrl.base.command_start import PROGRAM
 from halfdof_ctrl.base.errors import HalfdofError, HalfdofWarning, InterruptedResponseWarning, own_messages
 from halfdof_ctrl.base.printable import printable
-from halfdof_ctrl.base.progress import activity, clear_activity
+from halfdof_ctrl.base.progress import activity, clear_activity, end_activity
 from halfdof_ctrl.commands import (
     BUILT_IN_MODELS,
     DONE,
@@ -61,6 +61,7 @@ INTERRUPTED, BROKEN_PIPE, TERMINATED = 130, 141, 143  #: as shells report the si
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command with its arguments, by default those of the process, and give its exit code."""
+    end_activity()  # of the imports
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):  # a name that the terminal cannot show is no reason to stop
             stream.reconfigure(errors="backslashreplace")

@@ -90,7 +90,12 @@ def progress_bar(total: int | None, what: str, *, show: bool | None = None) -> I
         def advance(steps: int) -> None:
             bar.update(steps)
 
-        yield advance
+        pulse = None if getattr(bar, "disable", True) else _Pulse(bar)
+        try:
+            yield advance
+        finally:
+            if pulse is not None:
+                pulse.stop()
 
 
 @contextmanager
@@ -122,6 +127,22 @@ def activity(what: str, *, show: bool | None = None) -> Iterator[None]:
         yield
     finally:
         _ACTIVITY.reset(token)
+        clock.stop()
+
+
+def begin_activity(what: str) -> None:
+    """Show from now on how long something has been at work, until `end_activity`: what a `with` cannot stand around."""
+    if not _is_hidden(None) and os.environ.get("TQDM_DISABLE", "0") in {"", "0"}:
+        clock = _Clock(what)
+        _ACTIVITY.set(clock)
+        clock.start()
+
+
+def end_activity() -> None:
+    """Show it no longer."""
+    clock = _ACTIVITY.get()
+    if clock is not None:
+        _ACTIVITY.set(None)
         clock.stop()
 
 
@@ -186,6 +207,29 @@ class _Clock(threading.Thread):
             self.stream.write(f"\r{text:<{self.shown}}\r")
             self.stream.flush()
         self.shown = len(text)
+
+
+class _Pulse(threading.Thread):
+    """Draws a bar again and again while a step lasts: tqdm draws it at the end of one."""
+
+    def __init__(self, bar: Any) -> None:  # noqa: ANN401  # of tqdm, which is imported late
+        super().__init__(name="halfdof_ctrl pulse", daemon=True)
+        self.bar, self.over = bar, threading.Event()
+        self.start()
+
+    def run(self) -> None:
+        """Beat."""
+        wait = DELAY
+        while not self.over.wait(wait):
+            wait = TICK
+            with suppress(OSError, ValueError):  # a terminal that went away
+                self.bar.refresh()
+                self.bar.last_print_t = time.time()  # so that tqdm knows that there is something to take away
+
+    def stop(self) -> None:
+        """Leave the bar to tqdm."""
+        self.over.set()
+        self.join()
 
 
 @contextmanager

@@ -180,3 +180,15 @@ def test_a_terminal_without_a_size_shows_what_is_done(monkeypatch: pytest.Monkey
             shown += os.read(parent, 4096)
     os.close(parent)
     assert b"frequencies: 100%" in shown
+
+
+def test_a_long_first_step_is_not_silent(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    """The bar stands there before any step is done, whatever the first one takes."""
+    terminal(monkeypatch)
+    with progress_bar(2, "steps") as advance:
+        monkeypatch.setattr(module, "TICK", 0.0)
+        shown = ""
+        while "steps:   0%" not in shown.partition("steps:   0%")[2]:  # drawn once more
+            shown += capsys.readouterr().err
+        advance(2)
+    assert "2/2" in capsys.readouterr().err
