@@ -118,8 +118,8 @@ def write_report(model: SecondOrderModel, folder: PathLike) -> Report:
     try:
         with naming_target(folder):
             build.mkdir()
-        _fill(build, findings, plots)
-        _move(build, target)
+            _fill(build, findings, plots)
+            _move(build, target)
     finally:
         shutil.rmtree(build, ignore_errors=True)
         for made in plots:

@@ -31,8 +31,25 @@ class _Printable(io.TextIOWrapper):
     def write(self, text: str) -> int:
         """Write text with control characters as escapes."""
         clear_activity()
-        super().write(printable(text))
+        with _naming_stdout():
+            super().write(printable(text))
         return len(text)
+
+    def flush(self) -> None:
+        """Write out what is held."""
+        with _naming_stdout():
+            super().flush()
+
+
+@contextmanager
+def _naming_stdout() -> Iterator[None]:
+    """Let an OSError tell that it is about this stream; a broken pipe says so by its class."""
+    try:
+        yield
+    except OSError as failure:
+        if failure.errno is None or failure.errno == errno.EPIPE:
+            raise
+        raise OSError(failure.errno, failure.strerror, "standard output") from failure
 
 
 class _Closed(io.TextIOBase):
@@ -72,10 +89,6 @@ def asked_output_only() -> Iterator[None]:
     try:
         yield
         stream.flush()
-    except OSError as failure:
-        if failure.filename is None and failure.errno is not None and failure.errno != errno.EPIPE:
-            raise OSError(failure.errno, failure.strerror, "standard output") from failure
-        raise
     finally:
         _flush_compiled()
         sys.stdout = before

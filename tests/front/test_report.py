@@ -187,8 +187,9 @@ def test_a_failure_on_the_way_leaves_nothing(tmp_path: Path, monkeypatch: pytest
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("halfdof_ctrl.report.save_system", full_disk)
-    with pytest.raises(OSError, match="No space left"):
+    with pytest.raises(OSError, match="No space left") as failure:
         write_report(MOUNT, tmp_path / "report")
+    assert failure.value.filename == str(tmp_path / "report")
     assert list(tmp_path.iterdir()) == []
 
 

@@ -150,3 +150,11 @@ def test_a_signal_that_arrives_in_a_destructor_is_not_lost(
         _receive_in_a_destructor(number)
     assert capsys.readouterr() == ("", "")
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM), sys.unraisablehook) == before
+
+
+@posix
+def test_a_disk_that_is_full_elsewhere_is_not_called_stdout(tmp_path: Path) -> None:
+    """What fails names itself, or says that it is a file; stdout was not written to."""
+    done = run("raise OSError(28, 'No space left on device')", folder=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "halfdof-ctrl: error: file: No space left on device\n"
