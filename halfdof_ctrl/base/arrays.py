@@ -31,7 +31,7 @@ LARGEST_SIZE = 1e154  #: of an entry, so that the product of two does not overfl
 SIGNAL_SIZES = (1e-200, 1e200)  #: the same of B, F and D, which enter a product but once
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
 EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of a matrix up to which they are of similar sizes
-FEW_ENTRIES = 400  #: of a matrix, up to which they are compared as plain numbers, which takes a microsecond
+FEW_COMPARED = 400  #: of a matrix, up to which they are compared as plain numbers, which takes a microsecond
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -269,7 +269,7 @@ def has_even_entries(matrix: FloatArray) -> bool:
     >>> [has_even_entries(np.array([[0.0, 1.0], [entry, -2.0]])) for entry in (-400.0, -1e12)]
     [True, False]
     """
-    if matrix.size <= FEW_ENTRIES:
+    if matrix.size <= FEW_COMPARED:
         sizes = [abs(entry) for entry in matrix.ravel("K").tolist() if entry]
         return not sizes or max(sizes) <= EVEN_ENTRIES * min(sizes)
     entries = np.abs(matrix[matrix != 0.0])

@@ -27,7 +27,7 @@ TICK_INCHES = (0.5, 0.35)  #: room of a number on the axes, across and up [in]
 EDGE = 0.07  #: text centred nearer than this to the left edge would cross it
 SAME_POLE = 1e-4  #: relative distance up to which poles count as multiple; rounding splits a triple one so far
 FAR_OF_CIRCLE = 4.0  #: times its radius: points farther out would leave the unit circle no room
-BEYOND = "halfdof_ctrl beyond"  #: gid of the text about points beyond the limits
+FAR_OUTSIDE = "halfdof_ctrl beyond"  #: gid of the text about points beyond the limits
 GREY = "0.78"
 BEHIND = {"facecolor": "white", "edgecolor": "none", "pad": 0.6}
 GRID_TEXT: dict[str, Any] = {"fontsize": "x-small", "color": "0.4", "clip_on": True, "zorder": 1.5, "bbox": BEHIND}
@@ -175,9 +175,9 @@ def mark_beyond(ax: Axes, points: npt.NDArray[np.complexfloating], what: str, co
     beyond = sorted(points[~_inside(ax, points)].tolist(), key=abs)
     if beyond:
         places = listed([f"{value.real:.4g}" if value.imag == 0.0 else f"{value:.4g}" for value in beyond], most=4)
-        place = 0.02, 0.02 + 0.06 * sum(text.get_gid() == BEYOND for text in ax.texts)
+        place = 0.02, 0.02 + 0.06 * sum(text.get_gid() == FAR_OUTSIDE for text in ax.texts)
         text = ax.text(*place, f"{what} beyond: {places}", transform=ax.transAxes, color=colour, fontsize="small")
-        text.set_gid(BEYOND)
+        text.set_gid(FAR_OUTSIDE)
 
 
 def _natural_frequencies(ax: Axes, reach: float) -> FloatArray:

@@ -26,12 +26,12 @@ from scipy.sparse.csgraph import connected_components
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, ComplexArray, FloatArray
 from halfdof_ctrl.base.double_double import matrix_product
 
-REACH = 16.0  #: times what rounding moves it: as far an eigenvalue reaches for others ...
-ALIKE = 1e-10  #: ... and this part of its size in any case
+NEIGHBOURHOOD = 16.0  #: times what rounding moves it: as far an eigenvalue reaches for others ...
+ONE_POLE = 1e-10  #: ... and this part of its size in any case
 DEFECTIVE = 16.0  #: times n u: cosines of left and right vectors below say no more than that there is a chain ...
 CHAIN = 1e-2  #: ... whose eigenvalues lie within this part of their size, or as close as rounding of the largest
-TOLD_APART = 0.1  #: of the distance to the next eigenvalue: a smaller bound of first order holds
-HALVINGS = 200  #: of the bracket of a radius, in logarithms
+SINGLE_SHARE = 0.1  #: of the distance to the next eigenvalue: a smaller bound of first order holds
+RADIUS_HALVINGS = 200  #: of the bracket of a radius, in logarithms
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,9 +82,9 @@ def clusters(A: FloatArray, values: ComplexArray, data: FloatArray, cosine: Floa
 def _groups(A: FloatArray, values: ComplexArray, data: FloatArray, cosine: FloatArray) -> list[npt.NDArray[np.intp]]:
     """Return which eigenvalues reach for each other, in groups of at least two."""
     n, size = values.size, float(np.linalg.norm(A, 1))
-    chain = CHAIN * np.abs(values) + REACH * UNIT_ROUNDOFF * size
-    reach = np.where(cosine > DEFECTIVE * n * UNIT_ROUNDOFF, REACH * np.minimum(data, size), chain)
-    linked = np.abs(values[:, None] - values) <= np.maximum(reach[:, None] + reach, ALIKE * np.abs(values))
+    chain = CHAIN * np.abs(values) + NEIGHBOURHOOD * UNIT_ROUNDOFF * size
+    reach = np.where(cosine > DEFECTIVE * n * UNIT_ROUNDOFF, NEIGHBOURHOOD * np.minimum(data, size), chain)
+    linked = np.abs(values[:, None] - values) <= np.maximum(reach[:, None] + reach, ONE_POLE * np.abs(values))
     count, label = connected_components(linked, directed=False)
     groups = [np.flatnonzero(label == k) for k in range(count)]
     return [group for group in groups if group.size > 1]
@@ -134,7 +134,7 @@ def _bounded(
         single = error / np.abs(np.einsum("ij,ij->j", left.conj(), right))
     distance = np.abs(eigenvalues[:, None] - eigenvalues)
     np.fill_diagonal(distance, np.inf)
-    is_single = single <= TOLD_APART * distance.min(axis=1)
+    is_single = single <= SINGLE_SHARE * distance.min(axis=1)
     return eigenvalues, np.where(is_single, np.minimum(single, bounds), bounds)
 
 
@@ -161,7 +161,7 @@ def _radius(N: ComplexArray, error: float) -> float:
     high = low
     while not holds(high):
         low, high = high, 2.0 * high
-    for _ in range(HALVINGS):
+    for _ in range(RADIUS_HALVINGS):
         if high <= 1.01 * low:
             break
         middle = float(np.sqrt(low * high))

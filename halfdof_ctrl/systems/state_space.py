@@ -127,9 +127,10 @@ def mech2ss(
     else:
         require_matrix(model, "mech2ss", parameter="model")
         model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
-    system = system_of_model(model, improper=improper, states=states)
-    looked_at = model.model if isinstance(model, ExactReduction) else model
-    warn_of_python_control(looked_at, system, states)
+    reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
+    system = system_of_model(reduction, improper=improper, states=states)
+    if not (states == "dofs" and reduction.solution.is_even):
+        warn_of_python_control(reduction.model, system, states)
     return system
 
 

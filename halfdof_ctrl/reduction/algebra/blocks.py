@@ -14,7 +14,7 @@ from halfdof_ctrl.reduction.algebra.scaling import Scaling, gap_threshold, unit_
 
 RANK_TOLERANCE = 16 * EPS  #: times the block's size; singular values below are null
 ENTRY_NOISE = 2 * EPS  #: times the block's size and its largest singular value: rounding of the entries makes no more
-SPECK = 4 * EPS  #: times the block's size: an entry of a vector of length one below that is rounding of a zero
+UNNOTICED = 4 * EPS  #: times the block's size: an entry of a vector of length one below that is rounding of a zero
 NULL_CORRECTIONS = 2  #: of null vectors, each by a residual in twice the working precision
 UNCLEAR_RANK = 1e3  #: singular values above that and below this times it are split at the widest gap
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
@@ -64,7 +64,7 @@ def split_block(block: FloatArray, tol: float | None) -> BlockSplit:
         bound = gap_threshold(values / values[0], rounding, rounding * UNCLEAR_RANK)
     rank = int(np.count_nonzero(values > bound * values[0]))
     spread = float(values[0] / values[rank - 1]) if rank else 1.0
-    speck = SPECK * max(block.shape)
+    speck = UNNOTICED * max(block.shape)
     noise = 0.0 if _hides_rank(block, rank) else ENTRY_NOISE * max(block.shape) * float(values[0])
     seen = scaling.columns[:, None] * np.where(np.abs(right[:rank].T) <= speck * spread, 0.0, right[:rank].T)
     null = _null_columns(block, scaling, (left[:, :rank], values[:rank], right), speck, spread)

@@ -16,7 +16,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
 PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
-DIGITS = 53  #: binary ones of a double
+DOUBLE_DIGITS = 53  #: binary ones of a double
 SPARE_DIGITS = 2  #: that are zero in a number that was not rounded
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
@@ -166,7 +166,7 @@ def has_short_entries(values: FloatArray) -> bool:
     >>> has_short_entries(np.array([[3.0, 1.0 + 2.0**-45]])), has_short_entries(np.array([[0.1, 3.0]]))
     (True, False)
     """
-    return not np.any(np.ldexp(np.frexp(values)[0], DIGITS - SPARE_DIGITS) % 1.0)
+    return not np.any(np.ldexp(np.frexp(values)[0], DOUBLE_DIGITS - SPARE_DIGITS) % 1.0)
 
 
 def _eliminate(work: IntegerArray, n: int) -> int:

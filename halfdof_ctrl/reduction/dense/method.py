@@ -18,7 +18,7 @@ from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
-from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, loses_nothing, measured_loss
+from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, is_well_conditioned, loses_nothing, measured_loss
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
@@ -28,7 +28,7 @@ from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signa
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
-FEW_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
+ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LOSS_LOOKED_AT = 1e-12  #: other coordinates are tried only where that much is lost indeed, whatever the bound says
@@ -158,7 +158,8 @@ def _solved(model: SecondOrderModel, coordinates: DofPartition, *, asked: bool =
             raise _singular_error(model, coordinates, W, leading)
         return None
     equations = solved_at_once(model, coordinates, leading)
-    return SingleSolve(model=model, coordinates=coordinates, leading=leading, equations=equations)
+    even = len(equations.A) <= ASKED_STATES and is_well_conditioned(equations.A)
+    return SingleSolve(model=model, coordinates=coordinates, leading=leading, equations=equations, is_even=even)
 
 
 def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolve:
@@ -182,8 +183,8 @@ def _loses_nothing(found: SingleSolve) -> bool:
     part = found.coordinates
     if not found.leading.is_plainly_regular or part.basis is not None:
         return False
-    if len(found.A) <= FEW_STATES:
-        return loses_nothing(found.model, found.equations)
+    if len(found.A) <= ASKED_STATES:
+        return loses_nothing(found.model, found.equations, even=found.is_even)
     inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
     inertial[part.order[: part.n_inertial]] = True
     return not spread_is_wide(found.model, inertial)

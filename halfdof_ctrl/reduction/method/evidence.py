@@ -12,7 +12,7 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.reduction.algebra.blocks import BlockSplit
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss
 
-ILL_CONDITIONED = 1e-3  #: reciprocal condition number of W below which that is the cause of a loss
+CALLED_ILL_CONDITIONED = 1e-3  #: reciprocal condition number of W below which that is the cause of a loss
 CLOSE_GAP = 1e3  #: a decision about a rank with a smaller gap between singular values is warned of
 ALLOWED_LOSS = 1e-9  #: against a direct solve: above it other ways are tried, and what is kept is warned of
 NEARLY_MASSLESS = 1e-10  #: scaled mass of a DOF over the largest one, below which a warning is given
@@ -130,7 +130,7 @@ def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
     if loss.value > ALLOWED_LOSS:
         cause = (
             f"the equations for the highest derivatives are ill conditioned (reciprocal condition number {rcond:.1e})"
-            if rcond < ILL_CONDITIONED
+            if rcond < CALLED_ILL_CONDITIONED
             else "some states are far faster than others, as DOFs with hardly any mass or damping make them"
         )
         msg = (

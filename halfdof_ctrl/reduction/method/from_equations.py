@@ -14,6 +14,7 @@ class FromEquations:
 
     model: SecondOrderModel
     equations: StateEquations
+    is_even: bool = False  #: whether A is known to be well conditioned in its states as they stand
 
     @property
     def A(self) -> FloatArray:  # noqa: N802

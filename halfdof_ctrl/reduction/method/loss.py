@@ -17,7 +17,6 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.linalg.lapack import dgetrs
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix, has_even_entries, powers_of_two
 from halfdof_ctrl.base.exact_products import as_it_is
@@ -40,9 +39,9 @@ from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
 TYPICAL_POINTS = (0.2j, 0.55j, 1.6j, 4.4j)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
-SLOWEST = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
+SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-SHALLOW = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
+SHALLOW_AFTER = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
@@ -96,34 +95,49 @@ class _Measured:
     grown: FloatArray  #: size of the part of it that grows with frequency
 
 
-def loses_nothing(model: SecondOrderModel, equations: StateEquations) -> bool:
+def is_well_conditioned(A: FloatArray) -> bool:
+    """Return whether the condition number of A is below a thousand, so that solving with it loses three digits at most.
+
+    Examples
+    --------
+    >>> [is_well_conditioned(np.diag([1.0, part])) for part in (0.1, 1e-6)]
+    [True, False]
+    """
+    return not len(A) or EVEN_STATES * lu_and_rcond(A)[2] >= 1.0
+
+
+def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: bool) -> bool:
     """Tell at once whether few states, of a plainly regular W, lose nothing that is worth a look.
 
-    A is far from singular, as it stands or once its states are of one size and if no entry of M, C and K of few DOFs is
-    tiny beside the others of its matrix; and what static DOFs have of the states and of the inputs does not cancel.
+    A is well conditioned, as it stands (`even`) or once its states are of one size and if no entry of M, C and K of few
+    DOFs is tiny beside the others of its matrix; and what static DOFs have of the states and of the inputs does not
+    cancel.
 
     Examples
     --------
     A mass on a spring, and one of which nearly nothing is left:
 
     >>> from halfdof_ctrl import exact_reduction, mechss
-    >>> [loses_nothing(model, exact_reduction(model).solution.equations)
+    >>> [loses_nothing(model, exact_reduction(model).solution.equations, even=False)
     ...  for model in (mechss([[1]], [[0.1]], [[4]]), mechss([[1e-9]], [[0.1]], [[4]]))]
     [True, False]
     """
-    A, scale, q = equations.A, None, equations.displacement
+    A, q = equations.A, equations.displacement
     if not len(A) or equations.shift:
         return not len(A)
-    factors, pivots, rcond = lu_and_rcond(A)
-    if EVEN_STATES * rcond < 1.0:  # in these units at least
+    if even and not q.U:
+        return True
+    scale = np.ones((len(A), 1))
+    if not even:
         if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part) for part in model.quadratics.P):
             return False
-        A, scale = balanced_states(A)
-        factors, pivots, rcond = lu_and_rcond(A)
-    if EVEN_STATES * rcond < 1.0 or not q.U:
-        return EVEN_STATES * rcond >= 1.0
-    x = dgetrs(factors, pivots, equations.B if scale is None else equations.B / scale[:, None])[0]
-    x = x if scale is None else x * scale[:, None]
+        A, factors = balanced_states(A)
+        scale = factors[:, None]
+        if not is_well_conditioned(A):
+            return False
+    if not q.U:
+        return True
+    x = scale * np.linalg.solve(A, equations.B / scale)
     terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
     left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
     return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
@@ -150,7 +164,7 @@ def measured_loss(stored: Stored, allowed: float = 0.0) -> Loss:
     )
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
-    size = np.maximum(np.maximum(value, grown), SHALLOW * np.maximum.accumulate(value, axis=0))
+    size = np.maximum(np.maximum(value, grown), SHALLOW_AFTER * np.maximum.accumulate(value, axis=0))
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=value > 0.0)
     if not relative.size:
         return NOTHING_LOST
@@ -191,7 +205,7 @@ class _Comparison:
         if len(model.dofs) <= FEW_DOFS:
             speeds = _typical_speeds(model)
             typical = [slowest_speed(model) * BESIDE_MODE * 1j, *np.outer(speeds, TYPICAL_POINTS).ravel().tolist()]
-            points = np.concatenate([points[np.abs(points) > SLOWEST * min(speeds)], np.asarray(typical)])
+            points = np.concatenate([points[np.abs(points) > SLOWEST_SPEED * min(speeds)], np.asarray(typical)])
             speed = speeds[-1]
         rows, columns = scaling = max_scaling(_terms(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]

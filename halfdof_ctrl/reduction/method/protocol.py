@@ -77,6 +77,10 @@ class ReductionMethod(Protocol):
         """What the states rest on."""
 
     @property
+    def is_even(self) -> bool:
+        """Whether A is known to be well conditioned in its states as they stand: evaluations lose nothing then."""
+
+    @property
     def input_derivatives(self) -> int:
         """How many derivatives of the inputs the velocities may contain."""
 

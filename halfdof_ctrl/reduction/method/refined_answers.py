@@ -17,9 +17,9 @@ from halfdof_ctrl.base.spectrum import balanced_states
 
 Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
-MOST_CORRECTIONS = 4  #: of a solution
+MOST_ANSWER_CORRECTIONS = 4  #: of a solution
 CORRECTED = 1e-22  #: of what is seen: a smaller correction is the last one
-LAST_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
+SETTLED_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -77,7 +77,7 @@ def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: Co
     rest = equation.residual(s, together(x, u))
     low = step = solve(rest)
     size = CORRECTED * np.abs(equations.seen(s, x))
-    for _ in range(MOST_CORRECTIONS - 1):
+    for _ in range(MOST_ANSWER_CORRECTIONS - 1):
         if (np.abs(equations.seen(s, step)) <= size).all():
             break
         rest = equation.residual(s, together(step, np.zeros_like(u)), rest)
@@ -85,7 +85,7 @@ def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: Co
         low = low + step
     largest = np.abs(units[:, None] * x).max(axis=0, initial=0.0) / units[:, None]
     rounding = (
-        np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low) + LAST_DIGIT * equations.sizes(s, largest)
+        np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low) + SETTLED_DIGIT * equations.sizes(s, largest)
     )
     y = equations.seen(s, low) - output.residual(s, together(x, u))
     every = np.broadcast_to(np.abs(x).max(axis=0, initial=0.0), x.shape)

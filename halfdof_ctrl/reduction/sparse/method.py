@@ -47,6 +47,11 @@ class SparseSolve:
         return self.coordinates.method
 
     @property
+    def is_even(self) -> bool:
+        """Nobody has looked."""
+        return False
+
+    @property
     def A(self) -> FloatArray:  # noqa: N802
         """(N, N) state matrix."""
         return self.displacement.A
