@@ -23,9 +23,9 @@ def warn_of_free_motions(sys: control.StateSpace, free: FreeMotionCount) -> bool
         Rounding of A moves them further than that of a double pole does.
     """
     size = np.sort(np.abs(np.linalg.eigvals(sys.A)))
-    if size.size < free.poles:
+    if size.size <= free.poles:  # there is no other pole beside which they might be large
         return False
-    spurious, slowest = float(size[free.poles - 1]), float(size[min(free.poles, size.size - 1)])
+    spurious, slowest = float(size[free.poles - 1]), float(size[free.poles])
     if not spurious > USUAL_SPURIOUS * slowest:
         return False
     msg = (

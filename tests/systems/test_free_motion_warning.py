@@ -8,6 +8,8 @@ import pytest
 
 from halfdof_ctrl import SecondOrderModel, frequency_response, mech2ss, mechss
 from halfdof_ctrl.base.errors import LostDigitsWarning
+from halfdof_ctrl.model.free_motions import FreeMotionCount
+from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
 from halfdof_ctrl.systems.state_map import States
 from support.beams import beam_matrices
 from support.slycot_marks import HAS_SLYCOT
@@ -30,6 +32,12 @@ def test_lost_free_motions_are_announced_and_energy_states_keep_them() -> None:
     for states in kept:
         assert np.isinf(control.dcgain(mech2ss(model, states=states)))
     assert np.isinf(frequency_response(model, [0.0]).complex.real).all()
+
+
+def test_a_body_without_other_poles_needs_no_word() -> None:
+    """Nothing says whether 6e-9 rad/s is much, whichever kernel leaves a rounding error in A or none."""
+    system = control.StateSpace([[0.0, 1.0], [3.3e-17, 0.0]], [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    assert not warn_of_free_motions(system, FreeMotionCount(1, 2))
 
 
 def test_exact_zeros_need_no_word() -> None:
