@@ -55,6 +55,7 @@ def test_working_states_are_energy_where_the_model_allows_it() -> None:
     assert working_system(follower).state_labels == list(exact_reduction(follower).states)
 
 
+@pytest.mark.filterwarnings("ignore:The state space is exact, but:halfdof_ctrl.errors.LostDigitsWarning")
 def test_a_response_right_at_a_few_points_is_right_at_all_points() -> None:
     """A damper of 3e-11 N s/m carries the force to the mass: neither coordinates keep 1e-20 of the stiffness.
 

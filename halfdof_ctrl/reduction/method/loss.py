@@ -40,6 +40,8 @@ from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 TYPICAL_POINTS = (0.2j, 0.55j, 1.6j, 4.4j)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
+MOVED = 1e-5  #: of the slowest other pole: a slower one stood at the origin before rounding moved it ...
+DRIFT = 1e-12  #: ... and may change this part of a value
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 SHALLOW_AFTER = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
@@ -204,8 +206,10 @@ class _Comparison:
         speed = float(np.median(np.abs(points))) if N else 1.0
         if len(model.dofs) <= FEW_DOFS:
             speeds = _typical_speeds(model)
-            typical = [slowest_speed(model) * BESIDE_MODE * 1j, *np.outer(speeds, TYPICAL_POINTS).ravel().tolist()]
-            points = np.concatenate([points[np.abs(points) > SLOWEST_SPEED * min(speeds)], np.asarray(typical)])
+            points = points[np.abs(points) > SLOWEST_SPEED * min(speeds)]
+            rest = _end_of_drift(stored.A, float(np.abs(points).min(initial=np.inf)))
+            typical = np.append(np.outer(speeds, np.abs(TYPICAL_POINTS)), slowest_speed(model) * BESIDE_MODE)
+            points = np.concatenate([points, 1j * np.unique(np.maximum(typical, rest))])
             speed = speeds[-1]
         rows, columns = scaling = max_scaling(_terms(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
@@ -270,6 +274,19 @@ class _Comparison:
         forces = [EPS * terms * generator.uniform(-1.0, 1.0, terms.shape) for _ in range(TRIED_ROUNDINGS)]
         changes = [np.abs(self.motion.seen(s, answer(force.astype(np.complex128)))) for force in forces]
         return np.asarray(np.max(changes, axis=0))
+
+
+def _end_of_drift(A: FloatArray, slowest: float) -> float:
+    """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
+
+    A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2.
+    """
+    if not np.isfinite(slowest):
+        return 0.0
+    size = np.abs(np.linalg.eigvals(A))
+    moved = size[size <= MOVED * slowest]
+    twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
+    return float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=0.0))
 
 
 def _typical_speeds(model: SecondOrderModel) -> list[float]:
