@@ -22,6 +22,7 @@ from halfdof_ctrl.files.import_report import (
     PENALTY,
     ImportReport,
     MatrixReport,
+    copies,
     has_entries,
     mass_per_direction,
     matrix_report,
@@ -102,17 +103,15 @@ def read_matrices(
         signals = {key: without_dofs(key, part, kept) for key, part in signals.items()}
         names = dofs = tuple([names[index] for index in kept.tolist()])
     rounding = max([raw.known_to for raw in raws.values()], default=EPS)
-    looks = tuple(
-        [_looked_at(found.matrices[letter], letter, raws[letter], square[letter], largest) for letter in square]
-    )
+    looks = [_looked_at(found.matrices[key], key, raws[key], square[key], largest) for key in square]
     report = _report(
-        looks,
+        tuple(looks),
         square,
         names,
         files=tuple([path.name for path in found.files]),
         labelled=dofs is not None,
         signals=tuple([_origin(letter, source) for letter, source in taken_signals(found, signals).items()]),
-        doubts=tuple([f"{source.words} {doubt}" for source in found.signals.values() for doubt in source.raw.doubts]),
+        doubts=(*found.doubts, *copies(square)),
         unused=_unused(found, signals),
         similar=_similar(found, raws, [letter for letter, name in (matrices or {}).items() if name is None]),
         known_to=rounding,

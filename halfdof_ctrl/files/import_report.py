@@ -7,6 +7,7 @@ damping file that was forgotten.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from halfdof_ctrl.files.formats.raw_matrix import Storage
 
 SYMMETRIC_ENTRIES = 1e-9  #: asymmetry relative to the largest entry up to which a matrix is called symmetric
 PENALTY = 1e35  #: a stiffness from here on is a boundary condition; Abaqus writes 1e36
+TELLING_VALUES = 3  #: different entries of a matrix that is no identity or chain of equal parts
 WHAT = {"M": "mass", "C": "damping", "K": "stiffness", "S": "structural damping"}
 
 
@@ -210,6 +212,26 @@ def matrix_report(letter: str, source: str, matrix: csc_array, largest: int, **f
         inertia=inertia(real, largest, found.get("known_to", EPS)),
         **found,
     )
+
+
+def copies(matrices: Mapping[str, csc_array]) -> list[str]:
+    """Tell which two of M, C and K are the same numbers, more than two of them: one was saved under two names.
+
+    Examples
+    --------
+    >>> whole = csc_array([[3.0, -1.0], [-1.0, 2.0]])
+    >>> copies({"K": whole, "M": whole, "C": 2 * whole})
+    ['K and M are the same matrix, number for number: one may have been saved under the name of the other']
+    """
+    return [
+        f"{one} and {other} are the same matrix, number for number: one may have been saved under the name of the other"
+        for one, other in combinations(matrices, 2)
+        if _are_same(matrices[one], matrices[other]) and np.unique(matrices[one].data).size >= TELLING_VALUES
+    ]
+
+
+def _are_same(one: csc_array, other: csc_array) -> bool:
+    return one.shape == other.shape and one.nnz == other.nnz > 0 and csc_array(one - other).nnz == 0
 
 
 def has_entries(matrix: csc_array) -> npt.NDArray[np.bool_]:

@@ -63,6 +63,11 @@ class Sources:
     own_layout: bool  #: whether it is one file with all that save_model writes
 
     @property
+    def doubts(self) -> tuple[str, ...]:
+        """What may be wrong with signals."""
+        return tuple([f"{source.words} {doubt}" for source in self.signals.values() for doubt in source.raw.doubts])
+
+    @property
     def holds(self) -> str:
         """What the files with named variables hold beside what is used, with the argument that says which is which."""
         said = [source for source in self.matrices.values() if source.raw.named]

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl import load_model
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
 from halfdof_ctrl.files.assembly import ImportedModel, read_matrices
 from support.fe_files import CHAIN, NAMES, C, K, M, abaqus, dmig, harwell_boeing, mapping, matrix_market, output4_binary
 
@@ -210,3 +211,13 @@ def test_the_order_of_lines_and_the_triangle_do_not_matter(seed: int, tmp_path_f
             swapped.append(line if rng.random() < 0.5 else f"{c},{d}, {a},{b}, {value}")
         (folder / name).write_text("\n".join(rng.permutation(swapped).tolist()) + "\n")
     require_chain(read_matrices([folder]))
+
+
+def test_one_matrix_under_two_names_is_warned_of(tmp_path: Path) -> None:
+    """A file that was copied over another one, or saved under the wrong name; identities and chains may be alike."""
+    whole = np.diag([3.0, 2.0, 4.0]) + np.diag([-1.0, -1.0], 1) + np.diag([-1.0, -1.0], -1)
+    np.savez(tmp_path / "a.npz", M=whole, C=0.5 * whole, K=whole)
+    with pytest.warns(ImportedModelWarning, match="M and K are the same matrix, number for number"):
+        load_model(tmp_path / "a.npz")
+    np.savez(tmp_path / "b.npz", M=np.eye(3), C=0.5 * whole, K=np.eye(3))
+    load_model(tmp_path / "b.npz")

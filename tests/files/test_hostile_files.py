@@ -131,14 +131,14 @@ def test_a_packed_banded_matrix_is_read_without_its_zeros(tmp_path: Path, ending
     stiffness = np.diag(np.arange(1.0, n + 1)) - 0.25 * (np.eye(n, k=1) + np.eye(n, k=-1)) + 0.125 * np.eye(n, k=3)
     path = tmp_path / ("a.npz" if ending == "npz" else "a.mat")
     if ending == "npz":
-        np.savez_compressed(path, K=stiffness, M=np.asfortranarray(stiffness))
+        np.savez_compressed(path, K=stiffness, M=np.asfortranarray(2.0 * stiffness))
     elif ending == "mat":
-        scipy.io.savemat(path, {"K": stiffness, "M": stiffness}, do_compression=True)
+        scipy.io.savemat(path, {"K": stiffness, "M": 2.0 * stiffness}, do_compression=True)
     else:
         h5py = pytest.importorskip("h5py")
         with h5py.File(path, "w", userblock_size=512) as file:
-            for name in "KM":
-                file.create_dataset(name, data=stiffness.T, compression="gzip", chunks=(100, 100))
+            for name, factor in (("K", 1.0), ("M", 2.0)):
+                file.create_dataset(name, data=factor * stiffness.T, compression="gzip", chunks=(100, 100))
         path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM" + path.read_bytes()[128:])
     if damaged:
         content = path.read_bytes()
@@ -156,7 +156,7 @@ def test_a_packed_banded_matrix_is_read_without_its_zeros(tmp_path: Path, ending
     found = load_model(path, matrices={"C": None})
     assert found.is_sparse
     np.testing.assert_array_equal(found.K.toarray(), stiffness)
-    np.testing.assert_array_equal(found.M.toarray(), stiffness)
+    np.testing.assert_array_equal(found.M.toarray(), 2.0 * stiffness)
 
 
 def test_links_out_of_a_matlab_file_are_not_followed(tmp_path: Path) -> None:

@@ -274,7 +274,11 @@ def test_objects_are_not_unpickled(tmp_path: Path) -> None:
         ({"K": K, "M": K, "C": [[1.0]]}, r"differ in size \(M 2 x 2, C 1 x 1, K 2 x 2\)", type(None)),
         ({"K": K, "dofs": ["y", "y"]}, "Names of DOFs must differ", SignalNameError),
         ({"K": K, "dofs": [1.5, 2.0]}, "dofs must be names, but it holds entries of type float64", FileFormatError),
-        ({"K": K, "M": K, "C": K, "name": ["a", "b"]}, "name must be one text, but it has 2", FileFormatError),
+        (
+            {"K": K, "M": np.eye(2), "C": np.eye(2), "name": ["a", "b"]},
+            "name must be one text, but it has 2",
+            FileFormatError,
+        ),
     ],
 )
 def test_a_model_that_mechss_refuses_is_refused_with_the_file(

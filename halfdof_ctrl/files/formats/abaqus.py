@@ -8,13 +8,15 @@ In the file ``job_STIF1.mtx`` (MASS: mass, DMPV: viscous damping, DMPS: structur
 with comments ``**`` and keywords ``*MATRIX``. It is no Matrix Market file in spite of its ending. Of a symmetric
 matrix one entry of each off-diagonal pair is written; an unsymmetric one has both. Nodes with a negative label are
 internal, as the multipliers of constraints. A DOF under a boundary condition has 1e36 on the diagonal of its
-stiffness. ``SCALE FACTOR=`` multiplies the entries; a second ``*MATRIX INPUT`` in the file is refused. Lines without
-labels that begin to count at 0 are read so, and told. A load is ``node, DOF, value`` behind ``*CLOAD``.
+stiffness. ``SCALE FACTOR=`` multiplies the entries; a second ``*MATRIX INPUT`` in the file is refused, and so are
+other keywords. Lines without labels that begin to count at 0 are read so, and told. A load is ``node, DOF, value``
+behind ``*CLOAD``.
 
 Source: Abaqus Analysis User's Guide, "Generating structural matrices"; Keywords Reference, ``*MATRIX INPUT``.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TypeAlias
 
@@ -31,11 +33,11 @@ from halfdof_ctrl.files.formats.text_blocks import number_rows, whole_numbers
 Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
-MATRIX_TYPE = re.compile(rb"^\*\s*matrix[^\n]*\btype\s*=\s*(unsymmetric|symmetric)", re.IGNORECASE | re.MULTILINE)
-MATRIX_INPUT = re.compile(rb"^\*\s*matrix\s+input", re.IGNORECASE | re.MULTILINE)
-SCALE = re.compile(rb"^\*\s*matrix[^\n]*\bscale\s+factor\s*=\s*([^\s,]+)", re.IGNORECASE | re.MULTILINE)
-ELSEWHERE = re.compile(rb"^\*\s*(?:matrix|include)[^\n]*\binput\s*=", re.IGNORECASE | re.MULTILINE)
-LOAD = re.compile(rb"^\*\s*cload", re.IGNORECASE | re.MULTILINE)
+KEYWORD_LINE = re.compile(rb"^\*(?!\*)[^\n]*", re.MULTILINE)
+MATRIX_INPUT, LOAD, INCLUDE = "MATRIXINPUT", "CLOAD", "INCLUDE"  #: without blanks, which Abaqus passes over
+KEYWORDS = (MATRIX_INPUT, LOAD, INCLUDE, "MATRIX", "MATRIXASSEMBLE")
+PARAMETERS = ("NAME", "TYPE", "SCALEFACTOR")  #: of *MATRIX INPUT in a file with numbers
+TYPES: dict[str, Declared] = {"SYMMETRIC": "symmetric", "UNSYMMETRIC": "unsymmetric"}
 LARGEST_LABEL = 2**31 - 1
 INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
 COMPONENT_BITS = 16
@@ -73,13 +75,7 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     (('n1_u1', 'n2_u1'), [[4.0, -1.0], [-1.0, 3.0]])
     """
     columns = data_columns(content)
-    has_keywords = b"*" in content
-    if has_keywords and (ELSEWHERE.search(content) or len(MATRIX_INPUT.findall(content)) > 1):
-        msg = (
-            "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read (and none "
-            "of *INCLUDE). Give the file with the numbers, or write each matrix into its own."
-        )
-        raise FileFormatError(msg, path="")
+    said = _keywords(content)
     if not columns:
         msg = (
             "no line of numbers in it that Abaqus writes (node, DOF, node, DOF, value). Write it by *MATRIX OUTPUT "
@@ -87,10 +83,9 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
         )
         raise FileFormatError(msg, path="")
     table = number_rows(content, columns, comment="*")
-    if has_keywords and columns == UNLABELLED and LOAD.search(content):
+    if columns == UNLABELLED and LOAD in said:
         return _load(table, known_to(content))
-    declared = _declared(content)
-    scale = _scale(content) if has_keywords else 1.0
+    declared, scale = _declared(said), _scale(said)
     table[:, -1] *= scale
     raw = _labelled(table, declared) if columns == LABELLED else _unlabelled(table, declared, most_rows)
     notes = raw.notes if scale == 1.0 else (*raw.notes, f"entries are multiplied by SCALE FACTOR={scale:g}")
@@ -98,23 +93,49 @@ def read_abaqus(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     return completed(raw) if declared == "unsaid" and raw.is_half_stored else raw
 
 
-def _declared(content: bytes) -> Declared:
-    found = MATRIX_TYPE.search(content[:65536])
-    if found is None:
-        return "unsaid"
-    return "symmetric" if found[1].lower() == b"symmetric" else "unsymmetric"
+def _keywords(content: bytes) -> dict[str, str]:
+    """Return the keywords and the parameters of *MATRIX INPUT, in capitals and without blanks.
+
+    Raises
+    ------
+    FileFormatError
+        Another file, a second matrix, keywords or parameters that are none of a matrix.
+    """
+    said: dict[str, str] = {}
+    for line in KEYWORD_LINE.findall(content) if b"*" in content else ():
+        shown = line[:60].decode("latin-1").strip()
+        word, *parameters = "".join(line[1:].decode("latin-1").upper().split()).split(",")
+        named = dict([parameter.partition("=")[::2] for parameter in parameters if parameter])
+        if word == INCLUDE or "INPUT" in named or (word == MATRIX_INPUT and word in said):
+            msg = (
+                "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read (and "
+                "none of *INCLUDE). Give the file with the numbers, or write each matrix into its own."
+            )
+            raise FileFormatError(msg, path="")
+        unknown = [name for name in named if word == MATRIX_INPUT and name not in PARAMETERS]
+        if word not in KEYWORDS or unknown or (word == LOAD and "IMAGINARY" in named):
+            msg = f"{shown!r} is not read, and may change what the numbers mean. Write each matrix into its own file."
+            raise FileFormatError(msg, path="")
+        said |= {word: "", **(named if word == MATRIX_INPUT else {})}
+    return said
 
 
-def _scale(content: bytes) -> float:
-    found = SCALE.search(content)
-    if found is None:
-        return 1.0
+def _declared(said: Mapping[str, str]) -> Declared:
+    kind = said.get("TYPE")
+    if kind is not None and kind not in TYPES:
+        msg = f"TYPE={kind[:30]} is neither SYMMETRIC nor UNSYMMETRIC. Write it anew."
+        raise FileFormatError(msg, path="")
+    return "unsaid" if kind is None else TYPES[kind]
+
+
+def _scale(said: Mapping[str, str]) -> float:
+    text = said.get("SCALEFACTOR", "1")
     try:
-        scale = float(found[1])
+        scale = float(text.replace("D", "E"))
     except ValueError:
         scale = 0.0
     if not 0.0 < abs(scale) < np.inf:
-        msg = f"SCALE FACTOR={found[1][:30].decode('latin-1')} is no number other than zero. Write it anew."
+        msg = f"SCALE FACTOR={text[:30]} is no number other than zero. Write it anew."
         raise FileFormatError(msg, path="")
     return scale
 

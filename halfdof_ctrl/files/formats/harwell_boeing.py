@@ -26,9 +26,10 @@ from halfdof_ctrl.files.formats.labels import WORD, ansys_ending, ansys_name
 from halfdof_ctrl.files.formats.raw_matrix import Declared, RawMatrix, assembled, most_rows
 from halfdof_ctrl.files.formats.text_blocks import AS_PYTHON, LONGEST_LINE, Lines, fixed_width, printable, whole_numbers
 
-TYPE_LETTERS = re.compile(rb"^[RCP][SUZHR][AE]", re.IGNORECASE)
+TYPE_LETTERS = re.compile(rb"^[RCPIQ][SUZHR][AE]", re.IGNORECASE)
 FORMATS = re.compile(rb"\(((?:[^()]|\([^()]*\))*)\)")
-DESCRIPTOR = re.compile(r"^(?:([+-]?\d+)P,?)?(\d*)\(?([IDEFG])(\d+)(?:\.\d+)?(?:E\d+)?\)?$")
+DESCRIPTOR = re.compile(r"^(?:([+-]?\d+)P,?)?(\d*)\(?([IDEFG])(\d+)(?:\.(\d+))?(?:E\d+)?\)?$")
+WITH_EXPONENT = re.compile(rb"\.[0-9]*(?:[DEQdeq][+-]?[0-9]|[+-][0-9])")
 SYMMETRY_OF_LETTER: dict[str, Declared] = {"S": "symmetric", "Z": "skew-symmetric", "U": "general", "R": "general"}
 TITLES = {"stiff": "K", "mass": "M", "damp": "C"}  #: first word of ANSYS's titles
 HEADER_LINES = 4
@@ -44,6 +45,8 @@ class _Header:
     entries: int
     lines: tuple[int, ...]  #: of pointers, row numbers and values
     fields: tuple[tuple[int, int], ...]  #: (fields of a line, characters of a field) of the same
+    decimals: int  #: digits behind the point of a value that has none
+    scale: int  #: power of ten by which a value without exponent is divided
     first: int  #: index of the first line of pointers
     right_hand_sides: int  #: lines of right-hand sides
 
@@ -66,7 +69,8 @@ def read_harwell_boeing(content: bytes) -> RawMatrix:
     ------
     FileFormatError
         Another type (pattern, complex, elements), a header that the file does not bear out, pointers or row numbers
-        that do not describe a matrix, fields that are no numbers.
+        that do not describe a matrix, fields that are no numbers, or are
+        numbers only with the point or the power of ten of their format.
     """
     lines = Lines(content)
     header = _header(lines, len(content))
@@ -76,6 +80,7 @@ def read_harwell_boeing(content: bytes) -> RawMatrix:
     for number, count in enumerate((columns + 1, header.entries, header.entries)):
         parts.append(_section(lines, start, header, number, count))
         start += header.lines[number]
+    _require_written_out(lines, range(start - header.lines[2], start), header)
     pointers, places = whole_numbers(parts[0], "pointers") - 1, whole_numbers(parts[1], "row numbers") - 1
     lengths = np.diff(pointers)
     if pointers[0] != 0 or pointers[-1] != header.entries or (lengths < 0).any():
@@ -166,6 +171,7 @@ def _header(lines: Lines, length: int) -> _Header:
         msg = f"it holds a matrix of type {kind!r}; real assembled ones are read (RSA, RUA, RZA)."
         raise FileFormatError(msg, path="", line=3)
     rows, columns, entries = _numbers(lines[2][3:], 3, 3)[:3]
+    descriptors = _descriptors(lines[3])
     right_hand_sides = cards[4] if len(cards) > HEADER_LINES else 0
     first = HEADER_LINES + (right_hand_sides > 0)
     if max(rows, columns) > most_rows(length) or first + sum(cards[1:4]) > len(lines):
@@ -180,7 +186,9 @@ def _header(lines: Lines, length: int) -> _Header:
         shape=(rows, columns),
         entries=entries,
         lines=tuple(cards[1:4]),
-        fields=_descriptors(lines[3]),
+        fields=tuple([found[:2] for found in descriptors]),
+        decimals=descriptors[-1][2],
+        scale=descriptors[-1][3],
         first=first,
         right_hand_sides=right_hand_sides,
     )
@@ -195,8 +203,8 @@ def _numbers(line: bytes, least: int, number: int) -> list[int]:
     return [int(field) for field in fields]
 
 
-def _descriptors(line: bytes) -> tuple[tuple[int, int], ...]:
-    """Read Fortran format descriptors such as (10I8), (d25.15), (1P,5E16.8)."""
+def _descriptors(line: bytes) -> tuple[tuple[int, int, int, int], ...]:
+    """Read Fortran format descriptors such as (10I8), (d25.15), (1P,5E16.8): fields, width, decimals, scale."""
     found = []
     texts = [text.decode("latin-1").upper().replace(" ", "") for text in FORMATS.findall(line)[: len(SECTIONS)]]
     for text in texts:
@@ -204,7 +212,8 @@ def _descriptors(line: bytes) -> tuple[tuple[int, int], ...]:
         sound = match is not None and 0 < int(match[2] or 1) * int(match[4]) <= LONGEST_LINE
         if match is None or not sound or (match[3] == "F" and int(match[1] or 0)):
             break
-        found.append((int(match[2] or 1), int(match[4])))
+        decimals = 0 if match[3] == "I" else int(match[5] or 0)
+        found.append((int(match[2] or 1), int(match[4]), decimals, int(match[1] or 0)))
     if len(found) < len(SECTIONS):
         shown = line.decode("latin-1").strip()[:70]
         msg = f"the formats of pointers, row numbers and values belong here, as (10I8), not {shown!r}."
@@ -232,6 +241,19 @@ def _section(lines: Lines, start: int, header: _Header, number: int, count: int)
     if not np.isfinite(values).all():
         raise _bad_field(lines, range(start, start + needed), (width, per_line), SECTIONS[number])
     return values
+
+
+def _require_written_out(lines: Lines, where: range, header: _Header) -> None:
+    """Refuse values in which Fortran reads a point or a power of ten that does not stand there."""
+    text = b"\n".join([lines[place] for place in where]) if header.decimals or header.scale else b""
+    if header.decimals and text.count(b".") < header.entries:
+        what, how = "decimal point", f"makes decimals of the last {header.decimals} digits"
+    elif header.scale and len(WITH_EXPONENT.findall(text)) < header.entries:
+        what, how = "exponent", f"divides such values by 1e{header.scale}"
+    else:
+        return
+    msg = f"there are values without {what}, and their format {how}, which nobody may have meant. Write them out."
+    raise FileFormatError(msg, path="", line=where.start + 1)
 
 
 def _between_blanks(part: list[bytes], per_line: int, count: int) -> FloatArray | None:

@@ -125,7 +125,10 @@ def _read(content: bytes, header: _Header) -> Value:
         rows = ["".join([chr(int(unit)) for unit in row]) for row in real.tolist()]
         return [row.encode("utf-16-le", "surrogatepass").decode("utf-16-le").rstrip(" ") for row in rows]
     if header.kind == MAT4_SPARSE:
-        return _sparse(header.name, real)
+        if imaginary is not None:  # which stand in a fourth column of the same table
+            msg = f"the sparse matrix {header.name} says that it is followed by imaginary parts. The file is damaged."
+            raise FileFormatError(msg, path="")
+        return _sparse(header.name, real.astype(np.float64))
     return real if imaginary is None else real + 1j * imaginary
 
 

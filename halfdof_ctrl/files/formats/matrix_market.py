@@ -22,6 +22,7 @@ BANNER = b"%%matrixmarket"
 BANNER_PEEK = 256  #: bytes in which the banner begins
 LAYOUTS = ("coordinate", "array")
 FIELDS = {"real": 1, "double": 1, "integer": 1, "unsigned-integer": 1, "complex": 2}  #: numbers of a value
+WHOLE_FIELDS = ("integer", "unsigned-integer")
 SYMMETRIES = ("general", "symmetric", "skew-symmetric")
 SIZES_OF_LAYOUT = {"coordinate": 3, "array": 2}
 
@@ -49,8 +50,8 @@ def read_matrix_market(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
     Raises
     ------
     FileFormatError
-        An unknown kind (pattern, hermitian), sizes that the file does not bear out, entries that are no numbers, are
-        too many or too few or lie outside the matrix.
+        An unknown kind (pattern, hermitian), sizes that the file does not bear out, entries that are no numbers (or not
+        of the kind), are too many or too few or lie outside the matrix.
 
     Examples
     --------
@@ -66,6 +67,9 @@ def read_matrix_market(content: bytes, most_rows: int = MOST_ROWS) -> RawMatrix:
         i, j, values = _coordinate(content[start:], FIELDS[field], sizes[2], line)
     else:
         i, j, values = _array(content[start:], FIELDS[field], (rows, columns), symmetry, line)
+    if field in WHOLE_FIELDS and (whole_numbers(values, f"{field} entries") < 0).any() and field.startswith("unsigned"):
+        msg = "a negative entry, though the banner says unsigned. Its header is wrong, or the file is damaged."
+        raise FileFormatError(msg, path="")
     return assembled(
         i,
         j,
@@ -133,6 +137,9 @@ def _array(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the entries of an array, whose triangle is stored if it is symmetric."""
     rows, columns = shape
+    if symmetry != "general" and rows != columns:
+        msg = f"a matrix of {rows} x {columns} cannot be {symmetry}. The header is wrong."
+        raise FileFormatError(msg, path="")
     first = {"general": 0, "symmetric": 0, "skew-symmetric": 1}[symmetry]
     stored = rows * columns if symmetry == "general" else rows * (rows + 1) // 2 - first * rows
     table = number_rows(content, numbers, comment="%", first_line=line)

@@ -147,7 +147,8 @@ def npz_variables(content: bytes) -> list[Variable]:
 
 
 def _header(content: bytes, name: str) -> _Header:
-    version = content[len(MAGIC)] if content.startswith(MAGIC) and len(content) > len(MAGIC) + 1 else 0
+    major, minor = content[len(MAGIC) : len(MAGIC) + 2].ljust(2, b"\0")
+    version = major if content.startswith(MAGIC) and not minor else 0
     width = LENGTH_BYTES.get(version, 0)
     start = len(MAGIC) + 2 + width
     length = int.from_bytes(content[start - width : start], "little") if width else 0

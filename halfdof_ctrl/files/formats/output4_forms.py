@@ -13,7 +13,7 @@ from halfdof_ctrl.files.formats.raw_matrix import Declared
 
 Array: TypeAlias = npt.NDArray[Any]
 
-SYMMETRIC_FORM, DIAGONAL_FORM, IDENTITY_FORM = 6, 3, 8
+SYMMETRIC_FORM, DIAGONAL_FORM, ROW_FORM, IDENTITY_FORM = 6, 3, 7, 8
 PLAIN_FORMS = {1: "square", 2: "rectangular", 3: "diagonal", 6: "symmetric", 7: "row vector", 8: "identity"}
 OTHER_FORMS = {
     4: "lower triangular factor",
@@ -48,7 +48,7 @@ def meant_by_form(
     Raises
     ------
     FileFormatError
-        An identity with entries that are not its own.
+        An identity or a diagonal with entries that are not its own, a row vector of several rows and columns.
 
     Examples
     --------
@@ -61,6 +61,10 @@ def meant_by_form(
     if form == DIAGONAL_FORM and min(shape) == 1 and n > 1:
         place = rows + columns  # one of them is zero
         return place, place, values, (n, n)
+    wrong = form == DIAGONAL_FORM and bool(((rows != columns) & (values != 0)).any())
+    if wrong or (form == ROW_FORM and min(shape) > 1):
+        msg = f"{name} says that it is a {PLAIN_FORMS[form]} (form {form}), but it is none. The file is damaged."
+        raise FileFormatError(msg, path="")
     if form == IDENTITY_FORM and not rows.size:
         every = np.arange(n)
         return every, every, np.ones(n), (n, n)

@@ -113,7 +113,7 @@ def assembled(
     doubts = (*doubts, *_lonely(matrix, declared))
     matrix.eliminate_zeros()
     raw = RawMatrix(matrix=matrix, declared=declared, stored=storage(matrix), completed=False, doubts=doubts, **words)
-    return completed(raw) if declared in {"symmetric", "skew-symmetric"} and raw.stored != "diagonal" else raw
+    return completed(raw) if declared in {"symmetric", "skew-symmetric"} else raw
 
 
 def _lonely(matrix: csc_array, declared: Declared) -> tuple[str, ...]:

@@ -1,16 +1,21 @@
 """Claims about header fields that change the meaning of a file: used, or refused, in every format."""
 
+import io
 import struct
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import load_model
 from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
 from halfdof_ctrl.files.formats.abaqus import read_abaqus
 from halfdof_ctrl.files.formats.dmig import read_dmig
+from halfdof_ctrl.files.formats.harwell_boeing import read_harwell_boeing
+from halfdof_ctrl.files.formats.mat4 import mat4_variables
 from halfdof_ctrl.files.formats.matrix_market import read_matrix_market
+from halfdof_ctrl.files.formats.npy import read_npy
 from halfdof_ctrl.files.formats.output4 import read_output4
 from halfdof_ctrl.files.formats.text_blocks import fixed_width
 
@@ -169,3 +174,95 @@ def test_lines_far_shorter_than_their_fields_are_not_filled_up() -> None:
     """A header with a thousand fields a line must not take a thousand times the file."""
     with pytest.raises(ValueError, match="far shorter than their fields"):
         fixed_width([b"1"] * 100_000, 1, 1000, [1000] * 100_000)
+
+
+@pytest.mark.parametrize(
+    ("head", "message"),
+    [
+        (b"*MATRIX INPUT, NAME=K, MATRIX=IMAGINARY\n", "MATRIX=IMAGINARY' is not read"),
+        (b"*MATRIX INPUT, NAME=K, TYPE=DIAGONAL\n", "TYPE=DIAGONAL is neither"),
+        (b"*TRANSFORM\n", r"'\*TRANSFORM' is not read"),
+    ],
+)
+def test_keywords_of_abaqus_that_change_the_numbers_are_refused(head: bytes, message: str) -> None:
+    """Each was passed over."""
+    with pytest.raises(FileFormatError, match=message):
+        read_abaqus(head + b"1,1, 1,1, 4.0\n")
+
+
+@pytest.mark.parametrize("text", [b"SCALEFACTOR=2", b"Scale Factor = 2.D0", b"SCALE FACTOR=2., TYPE=SYMMETRIC"])
+def test_a_scale_factor_of_abaqus_may_be_written_in_any_way(text: bytes) -> None:
+    """Abaqus passes over blanks in keywords."""
+    assert read_abaqus(b"*MATRIX INPUT, NAME=K, " + text + b"\n1,1, 1,1, 4.0\n").matrix.toarray().tolist() == [[8.0]]
+
+
+@pytest.mark.parametrize(
+    ("banner", "sizes", "message"),
+    [
+        ("coordinate real skew-symmetric", "2 2 2\n1 1 4.0\n2 2 3.0\n", "it is skew-symmetric, but"),
+        ("coordinate integer general", "1 1 1\n1 1 4.5\n", "integer entries must be whole"),
+        ("array unsigned-integer general", "1 1\n-4\n", "though the banner says unsigned"),
+        ("array real symmetric", "3 2\n1\n2\n3\n4\n5\n6\n", "3 x 2 cannot be symmetric"),
+    ],
+)
+def test_entries_that_contradict_the_banner_are_refused(banner: str, sizes: str, message: str) -> None:
+    """The diagonal of a skew matrix, fractions among integers, signs of unsigned numbers, a symmetric rectangle."""
+    with pytest.raises(FileFormatError, match=message):
+        read_matrix_market(f"%%MatrixMarket matrix {banner}\n{sizes}".encode())
+
+
+@pytest.mark.parametrize(("form", "word"), [(3, "diagonal"), (7, "row vector")])
+def test_an_output4_matrix_that_is_not_of_its_form_is_refused(form: int, word: str) -> None:
+    """Entries beside the diagonal of a diagonal matrix, rows of a row vector."""
+    with pytest.raises(FileFormatError, match=f"says that it is a {word}"):
+        read_output4(op4_text("KAA", (2, 2), form, {1: [4.0, 1.0], 2: [1.0, 3.0]}).encode())
+
+
+def mat4(kind: int, table: list[list[float]], imaginary: int = 0) -> bytes:
+    """Write the variable K of MATLAB 4, with an imaginary part that repeats the real one."""
+    order = ">" if kind >= 1000 else "<"
+    numbers = np.array(table).astype(f"{order}f8").tobytes(order="F")
+    return struct.pack(f"{order}5i", kind, *np.shape(table), imaginary, 2) + b"K\0" + numbers * (1 + imaginary)
+
+
+def test_sparse_matrices_of_matlab_4_are_read_in_either_byte_order() -> None:
+    """What says that imaginary parts follow contradicts itself: they stand in a fourth column."""
+    table = [[1.0, 1.0, 4.0], [2.0, 1.0, 1.0], [2.0, 2.0, 0.0]]
+    for kind in (2, 1002):
+        (variable,) = mat4_variables(mat4(kind, table))
+        assert csc_array(variable.read()).toarray().tolist() == [[4.0, 0.0], [1.0, 0.0]]
+        (variable,) = mat4_variables(mat4(kind, table, 1))
+        with pytest.raises(FileFormatError, match="says that it is followed by imaginary parts"):
+            variable.read()
+
+
+def test_only_the_versions_of_numpy_that_there_are_are_read() -> None:
+    """1.1 could mean anything."""
+    stream = io.BytesIO()
+    np.save(stream, np.eye(2))
+    content = stream.getvalue()
+    assert read_npy(content).tolist() == [[1.0, 0.0], [0.0, 1.0]]
+    with pytest.raises(FileFormatError, match=r"does not begin as an array of numpy\.save"):
+        read_npy(content[:7] + b"\1" + content[8:])
+
+
+@pytest.mark.parametrize(
+    ("layout", "values", "message"),
+    [
+        ("(2F8.3)", "    4000    3000", "without decimal point.* decimals of the last 3 digits"),
+        ("(1P,2E8.1)", "     4.0     3.0", "without exponent.* divides such values by 1e1"),
+        ("(2I8)", "       4       3", ""),
+        ("(1P,2E8.1)", " 4.0E+00 3.0E+00", ""),
+    ],
+)
+def test_values_of_harwell_boeing_are_what_stands_there(layout: str, values: str, message: str) -> None:
+    """Fortran reads 4000 in F8.3 as 4 and 4.0 in 1PE8.1 as 0.4: whoever wrote that may have meant something else."""
+    counts = "".join([f"{count:14d}" for count in (3, 1, 1, 1, 0)])
+    sizes = f"{'RSA':14s}" + "".join([f"{count:14d}" for count in (2, 2, 2, 0)])
+    formats = f"{'(3I4)':16s}{'(2I4)':16s}{layout:20s}"
+    text = "\n".join([f"{'Stiffness':72s}key", counts, sizes, formats, "   1   2   3", "   1   2", values, ""])
+    if not message:
+        assert read_harwell_boeing(text.encode()).matrix.toarray().tolist() == [[4.0, 0.0], [0.0, 3.0]]
+        return
+    with pytest.raises(FileFormatError, match=message):
+        read_harwell_boeing(text.encode())
