@@ -18,6 +18,7 @@ from halfdof_ctrl.files.formats.text_blocks import is_cut_short
 from halfdof_ctrl.files.stiffness_tables import frequency_column, is_stiffness_table, stiffness_response
 from halfdof_ctrl.files.tables import FREQUENCY_HEAD, PARTS, TABLE_ENDINGS, TIME_HEAD, without_guard
 
+EVEN_STEPS = 1e-3  #: relative difference of steps that are equal but for the digits that are printed
 ROW_AGREEMENT = 1e-6  #: relative; tables that went through a spreadsheet have lost digits
 MANY_STEPS, FEW_GAPS, LONG_STEP = 8, 2, 1.5  #: steps of time that tell what is usual, and longer ones that are not
 
@@ -176,11 +177,29 @@ def _doubt_order(frequencies: FloatArray, values: FloatArray, path: PathLike) ->
     same = (values[:, 1:] == values[:, :-1]).all(axis=0)
     turns = (steps < 0.0) & (steps > 0.0).any()
     if not (same | turns).any():
+        _doubt_gaps(frequencies, path)
         return
     line = int(np.argmax(same | turns)) + 3
     what = "the same row as before" if same[line - 3] else "a frequency below the one before it, while others rise"
     msg = f"{path}, line {line}: {what}. If the table was not measured so, rows of it were doubled or moved."
     give_warning(msg, ImportedModelWarning)
+
+
+def _doubt_gaps(frequencies: FloatArray, path: PathLike) -> None:
+    """Warn of a few steps that are longer than all others, which are equal or have equal ratios."""
+    grids = [frequencies, *([np.log(frequencies)] if (frequencies > 0.0).all() else [])]
+    for grid in grids if frequencies.size > MANY_STEPS else ():
+        steps = np.diff(grid)
+        step = float(np.median(steps)) or np.inf
+        long = steps / step > LONG_STEP
+        if 0 < int(long.sum()) <= FEW_GAPS and (np.abs(steps[~long] / step - 1.0) < EVEN_STEPS).all():
+            line = int(np.argmax(long)) + 3
+            msg = (
+                f"{path}, line {line}: the frequencies leave a gap before it, and all others are spaced alike. If the "
+                "table was not measured so, rows of it are missing."
+            )
+            give_warning(msg, ImportedModelWarning)
+            return
 
 
 def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatArray, path: PathLike) -> None:

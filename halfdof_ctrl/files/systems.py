@@ -6,7 +6,7 @@ import control
 import numpy as np
 
 from halfdof_ctrl.base.arrays import checked_matrix
-from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning, give_warning
 from halfdof_ctrl.base.names import checked_names, listed
 from halfdof_ctrl.files.containers import Content, PathLike, load_variables, single_text, texts
 from halfdof_ctrl.files.naming import naming_the_file
@@ -52,6 +52,11 @@ def load_system(path: PathLike) -> control.StateSpace:
         As `load_model`.
     OSError
         The file is not there or cannot be read.
+
+    Warns
+    -----
+    ImportedModelWarning
+        There are names, but nothing tells whether time is continuous.
     """
     content = load_variables(path, (*SYSTEM_LETTERS, *SYSTEM_NAMES, "name", "dt"))
     missing = [letter for letter in SYSTEM_LETTERS if letter not in content]
@@ -59,7 +64,11 @@ def load_system(path: PathLike) -> control.StateSpace:
         msg = f"{path}: {listed(missing)} not in the file. A state space file holds A, B, C and D."
         raise FileFormatError(msg, path=str(path))
     with naming_the_file(path):
-        return _system(content)
+        found = _system(content)
+    if "dt" not in content and any(key in content for key in SYSTEM_NAMES):
+        msg = f"{path}: no dt in the file, so the system is taken as continuous."
+        give_warning(msg, ImportedModelWarning)
+    return found
 
 
 def _system(content: Content) -> control.StateSpace:
@@ -72,6 +81,10 @@ def _system(content: Content) -> control.StateSpace:
         found = texts(content, key)
         if found is not None:
             labels[key] = list(checked_names(found, count, key))
+    lost = [key for key, count in zip(SYSTEM_NAMES, (n, m, p), strict=True) if labels and count and key not in labels]
+    if lost:
+        msg = f"{listed(lost)} not in the file, though {listed(list(labels))} are: it is damaged. Write it anew."
+        raise FileFormatError(msg, path="")
     if "dt" in content:
         period = float(np.asarray(content["dt"]).item())
         labels["dt"] = True if period == UNKNOWN_PERIOD else period

@@ -12,6 +12,9 @@ from scipy.sparse import issparse
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.containers import MATRIX_ENDINGS, Content, PathLike, ending, has_controls, sparse_parts
+from halfdof_ctrl.files.formats.variables import FREE_BYTES
+
+BYTES_OF_A_CELL = 64  #: of MATLAB, beside its text
 
 
 @contextmanager
@@ -71,4 +74,16 @@ def save_matrices(path: PathLike, content: Content, names: Mapping[str, Sequence
         else:
             cells = {key: np.array(value, dtype=object).reshape(1, -1) for key, value in names.items()}
             title = {} if name is None else {"name": name}
-            scipy.io.savemat(stream, {**title, **cells, **content})  # type: ignore[arg-type]  # stubs know paths only
+            every: Any = {**title, **cells, **content}
+            sizes = [_size(value) for value in content.values()] + [_size_of_names(value) for value in names.values()]
+            packed = max(sizes, default=0) < FREE_BYTES // 2  # with a checksum; larger ones might not be unpacked
+            scipy.io.savemat(stream, every, do_compression=packed)  # type: ignore[arg-type]  # stubs know paths only
+
+
+def _size(value: Any) -> int:  # noqa: ANN401  # dense or sparse
+    parts = [getattr(value, part) for part in ("data", "indices", "indptr")] if issparse(value) else [np.asarray(value)]
+    return int(sum([part.nbytes for part in parts]))
+
+
+def _size_of_names(names: Sequence[str]) -> int:
+    return sum([BYTES_OF_A_CELL + 4 * len(name) for name in names])

@@ -9,8 +9,8 @@ import pytest
 import scipy.io
 from scipy.sparse import coo_array, csc_array
 
-from halfdof_ctrl import inspect_files, load_model, load_system, save_model
-from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl import inspect_files, load_model, load_system, mech2ss, save_model, save_system
+from halfdof_ctrl.base.errors import FileFormatError, ImportedModelWarning
 from halfdof_ctrl.files.containers import load_variables, sparse_parts
 from halfdof_ctrl.model.mechss import mechss
 from support.fe_files import K
@@ -112,3 +112,40 @@ def test_a_name_that_a_terminal_obeys_is_refused(tmp_path: Path) -> None:
     for door, file in ((load_model, "a.npz"), (load_system, "s.npz")):
         with pytest.raises(FileFormatError, match="name has control characters"):
             door(tmp_path / file)
+
+
+@pytest.mark.parametrize("key", ["states", "inputs", "outputs"])
+def test_a_state_space_that_lost_names_is_refused(tmp_path: Path, key: str) -> None:
+    """It would come back under other names, or as another kind of system, without a word."""
+    path = tmp_path / "a.npz"
+    save_system(mech2ss(mechss([[1.0]], [[1.0]], [[4.0]])), path)
+    with np.load(path) as archive:
+        content = dict(archive)
+    np.savez(path, **{name: value for name, value in content.items() if name != key})
+    with pytest.raises(FileFormatError, match=f"{key} not in the file, though"):
+        load_system(path)
+    np.savez(path, **{name: value for name, value in content.items() if name != "dt"})
+    with pytest.warns(ImportedModelWarning, match="no dt in the file, so the system is taken as continuous"):
+        assert load_system(path).dt == 0
+    np.savez(path, **{name: content[name] for name in "ABCD"})
+    assert load_system(path).nstates == 2
+
+
+def test_numbers_in_small_matlab_files_carry_a_checksum(tmp_path: Path) -> None:
+    """A byte that is lost anywhere behind the header is refused, not another number; large ones are stored plainly."""
+    path = tmp_path / "a.mat"
+    model = mechss(np.diag([1.0, 2.0]), None, np.array([[3.0, -1.0], [-1.0, 2.0]]))
+    save_model(model, path)
+    content = path.read_bytes()
+    np.testing.assert_array_equal(load_model(path).K, model.K)
+    for place in range(128, len(content)):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :])
+        try:
+            found = load_model(path)
+        except FileFormatError:
+            continue
+        np.testing.assert_array_equal(found.K, model.K)
+        np.testing.assert_array_equal(found.M, model.M)
+    save_model(mechss(np.eye(600), None, 2.0 * np.eye(600)), path)  # which would be packed to less than a tenth
+    assert path.stat().st_size > 600 * 600 * 8
+    np.testing.assert_array_equal(load_model(path).K, 2.0 * np.eye(600))

@@ -1,7 +1,9 @@
 """Tables that `save_response` and `save_gain` write: no spreadsheet takes a name for a formula."""
 
 import csv
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -128,3 +130,17 @@ def test_rows_of_a_frequency_response_that_were_doubled_or_moved_are_told(
     path.write_text("\n".join(table) + "\n")
     with pytest.warns(ImportedModelWarning, match=message):
         load_response(path)
+
+
+@pytest.mark.parametrize("spacing", [np.linspace, np.geomspace])
+def test_rows_of_a_frequency_response_that_are_missing_are_told(tmp_path: Path, spacing: Callable[..., Any]) -> None:
+    """A gap in a grid that is even otherwise; grids without a rule and even ones say nothing."""
+    path = tmp_path / "table.csv"
+    omega = spacing(1.0, 100.0, 25)
+    model = mechss([[1.0]], [[1.0]], [[4.0]])
+    save_response(frequency_response(model, np.delete(omega, [7, 8])), path)
+    with pytest.warns(ImportedModelWarning, match="line 9: the frequencies leave a gap before it"):
+        assert load_response(path).omega.size == 23
+    for whole in (omega, np.sort(np.random.default_rng(3).uniform(1.0, 100.0, 25))):
+        save_response(frequency_response(model, whole), path)
+        np.testing.assert_array_equal(load_response(path).omega, whole)

@@ -43,7 +43,8 @@ OP4_COMPLEX_TYPES, DOUBLE_TYPES, OP4_TYPES = (3, 4), (2, 4), range(1, 5)
 HEADER_BYTES = {24: 4, 48: 8}  #: bytes of a header: bytes of a word in it
 MOST_SETS = 4  #: matrices of as many columns as the file has bytes
 BIG = 65536  #: rows from which a sparse matrix is stored in the big form
-NUMBER_FORMAT = re.compile(r"(?:1P,?)?(\d+)[ED](\d+)\.\d+")
+NUMBER_FORMAT = re.compile(r"\(?(?:1P,?)?(\d+)[ED](\d+)\.\d+\)?")
+WIDE = "|I16"  #: ends a header whose counts have 16 characters
 DEFAULT_FORMAT = (5, 16)  #: numbers of a line and characters of a number
 
 
@@ -222,7 +223,7 @@ def _text_matrices(lines: Lines, room: int) -> Iterator[RawMatrix]:
 
 
 def _text_header(line: str, room: int, number: int) -> tuple[_Matrix, int, int]:
-    wide = line.endswith("|I16")
+    wide = line.endswith(WIDE)
     stops = (16, 32, 40, 48, 56) if wide else (8, 16, 24, 32, 40)
     cuts = [line[start:stop] for start, stop in zip((0, *stops), stops, strict=False)]
     try:
@@ -230,10 +231,11 @@ def _text_header(line: str, room: int, number: int) -> tuple[_Matrix, int, int]:
     except ValueError as cause:
         msg = f"columns, rows, form, type and name of a matrix belong here, not {line[:60]!r}. {DAMAGED}"
         raise FileFormatError(msg, path="", line=number + 1) from cause
-    match = NUMBER_FORMAT.match(line[stops[-1] :].strip().upper())
+    text = line[stops[-1] :].removesuffix(WIDE).strip()
+    match = NUMBER_FORMAT.fullmatch(text.upper())
     per_line, width = DEFAULT_FORMAT if match is None else (int(match[1]), int(match[2]))
-    if not 0 < per_line * width <= LONGEST_LINE:
-        msg = f"the number format {line[stops[-1] :].strip()!r} is none of OUTPUT4. {DAMAGED}"
+    if not 0 < per_line * width <= LONGEST_LINE or (text and match is None):
+        msg = f"the number format {text[:60]!r} is none of OUTPUT4. {DAMAGED}"
         raise FileFormatError(msg, path="", line=number + 1)
     return _opened(numbers, printable(cuts[4].encode("latin-1")), room), per_line, width
 

@@ -266,3 +266,12 @@ def test_values_of_harwell_boeing_are_what_stands_there(layout: str, values: str
         return
     with pytest.raises(FileFormatError, match=message):
         read_harwell_boeing(text.encode())
+
+
+@pytest.mark.parametrize("layout", ["2P,3E23.16", "1P,-E23.16", "1P,3F23.16", "1P,3E2"])
+def test_a_number_format_of_output4_that_is_none_is_refused(layout: str) -> None:
+    """Fields of another width would cut numbers."""
+    text = op4_text("KAA", (1, 1), 6, {1: [4.0]})
+    with pytest.raises(FileFormatError, match="is none of OUTPUT4"):
+        read_output4(text.replace("1P,3E23.16", layout).encode())
+    assert read_output4(text.replace("1P,3E23.16", "(1P,3E23.16)").encode())[0].matrix.toarray().tolist() == [[4.0]]
