@@ -8,7 +8,7 @@ else is guessed: the refusal lists what there is, with the argument that says it
 import re
 import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -109,10 +109,13 @@ def read_workspace(content: bytes, titles: Mapping[str, str | None], room: int, 
     dofs = texts(names, "dofs")
     rounding = _rounding(named, own_layout=own_layout)
     taken = [id(variable) for variable in chosen.values()]
+    raws = [_raw(letter, variable, dofs, rounding, _format(is_archive)) for letter, variable in chosen.items()]
+    lost = OWN_LAYOUT - set(named)
+    if len(lost) == 1 and raws:
+        doubt = f"has {listed(sorted(OWN_LAYOUT - lost))} but not {listed(list(lost))}: save_model writes them together"
+        raws[0] = replace(raws[0], doubts=(*raws[0].doubts, doubt))
     return Workspace(
-        matrices=tuple(
-            [_raw(letter, variable, dofs, rounding, _format(is_archive)) for letter, variable in chosen.items()]
-        ),
+        matrices=tuple(raws),
         left=tuple([variable for variable in others if id(variable) not in taken and variable.name]),
         texts=names,
         own_layout=own_layout,

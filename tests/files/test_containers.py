@@ -149,3 +149,15 @@ def test_numbers_in_small_matlab_files_carry_a_checksum(tmp_path: Path) -> None:
     save_model(mechss(np.eye(600), None, 2.0 * np.eye(600)), path)  # which would be packed to less than a tenth
     assert path.stat().st_size > 600 * 600 * 8
     np.testing.assert_array_equal(load_model(path).K, 2.0 * np.eye(600))
+
+
+@pytest.mark.parametrize("key", ["dofs", "inputs", "outputs"])
+def test_a_model_that_lost_names_is_warned_of(tmp_path: Path, key: str) -> None:
+    """It would come back under others, q0 or F_q0, without a word."""
+    path = tmp_path / "a.npz"
+    save_model(mechss([[1.0]], [[1.0]], [[4.0]], dofs=["y"], inputs=["f"], outputs=["z"]), path)
+    with np.load(path) as archive:
+        content = dict(archive)
+    np.savez(path, **{name: value for name, value in content.items() if name != key})
+    with pytest.warns(ImportedModelWarning, match=f"but not {key}: save_model writes them together"):
+        load_model(path)
