@@ -22,6 +22,9 @@ NEWLINE, BLANK_BYTES = 10, 32  #: bytes; what is not above the second cannot be 
 TAIL = 4096  #: bytes at the end of a text that are looked at
 FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
 WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
+EMPTY_AND_ONE = 2  #: tables: the one without rows that is always there, and another
+WIDE_ROW = 4096  #: numbers; longer rows are parsed in pieces ...
+WIDE_PIECE = 2**15  #: ... of so many bytes
 TOO_LONG = "a line has more than its fields"
 TOO_SHORT = "lines are far shorter than their fields"
 MOST_GROWTH = 10  #: times that lines may grow when blanks at their ends are filled in,
@@ -66,13 +69,38 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
         if not _has_rows(text, comment):  # loadtxt would warn, and a filter is the whole process's
             continue
         try:
-            table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
+            if columns > WIDE_ROW:
+                table = _wide_rows(text, columns, comment)
+            else:
+                table = np.loadtxt(io.BytesIO(text), comments=comment if marked else None, ndmin=2)
         except ValueError as cause:
             raise _bad_row(text, columns, comment, line) from cause
         if table.size and (table.shape[1] != columns or not np.isfinite(table).all()):
             raise _bad_row(text, columns, comment, line)
         tables.append(table.reshape(-1, columns))
-    return np.concatenate(tables)
+    return tables[-1] if len(tables) <= EMPTY_AND_ONE else np.concatenate(tables)  # a copy takes as much again
+
+
+def _wide_rows(text: bytes, columns: int, comment: str) -> FloatArray:
+    """Parse rows piece by piece: for one row loadtxt takes some thirty bytes a number."""
+    lines = [line for line in (whole.split(comment.encode(), 1)[0].strip() for whole in text.split(b"\n")) if line]
+    table = np.empty((len(lines), columns))
+    for row, line in zip(table, lines, strict=True):
+        start = filled = 0
+        while start < len(line):
+            stop = line.find(b" ", start + WIDE_PIECE)
+            piece = line[start : stop if stop > 0 else len(line)]
+            start += len(piece)
+            if not piece.strip():
+                continue
+            numbers = np.loadtxt(io.BytesIO(piece), comments=None, ndmin=1)
+            if filled + numbers.size > columns:
+                raise ValueError(TOO_LONG)
+            row[filled : filled + numbers.size] = numbers
+            filled += numbers.size
+        if filled < columns:
+            raise ValueError(TOO_SHORT)
+    return table
 
 
 def whole_numbers(values: FloatArray, what: str) -> np.ndarray[tuple[int, ...], np.dtype[np.int64]]:

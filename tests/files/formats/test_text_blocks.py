@@ -1,10 +1,28 @@
 """Claims about numbers in text: what is read, and the line of what is not."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from halfdof_ctrl.base.errors import FileFormatError
 from halfdof_ctrl.files.formats.text_blocks import Lines, fixed_width, number_rows, whole_numbers
+
+
+def test_long_rows_take_little_memory_and_are_checked_alike() -> None:
+    """200 000 numbers in a line of two bytes each, in less than ten times its size; one too few, many, or none."""
+    count = 200_000
+    text = b"7 " * count + b"* a comment\n\n"
+    tracemalloc.start()
+    table = number_rows(text, count, comment="*")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert table.shape == (1, count)
+    assert (table == 7.0).all()
+    assert most < 10 * len(text)
+    for wrong in (b"7 " * (count - 1), b"7 " * (count + 1), b"7 " * (count - 1) + b"x", b"7 " * (count - 1) + b"nan"):
+        with pytest.raises(FileFormatError):
+            number_rows(text + wrong, count, comment="*")
 
 
 def test_commas_blanks_tabs_and_exponents_of_fortran_are_one() -> None:
