@@ -21,6 +21,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix, has_even_entries, powers_of_two
 from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.model.free_motions import free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling_with_time, max_scaling
@@ -40,8 +41,7 @@ from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 TYPICAL_POINTS = (0.2j, 0.55j, 1.6j, 4.4j)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
-MOVED = 1e-5  #: of the slowest other pole: a slower one stood at the origin before rounding moved it ...
-DRIFT = 1e-12  #: ... and may change this part of a value
+DRIFT = 1e-12  #: part of a value that poles of free motions, which rounding has moved from the origin, may change
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 SHALLOW_AFTER = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
@@ -207,7 +207,7 @@ class _Comparison:
         if len(model.dofs) <= FEW_DOFS:
             speeds = _typical_speeds(model)
             points = points[np.abs(points) > SLOWEST_SPEED * min(speeds)]
-            rest = _end_of_drift(stored.A, float(np.abs(points).min(initial=np.inf)))
+            rest = _end_of_drift(model, stored.A)
             typical = np.append(np.outer(speeds, np.abs(TYPICAL_POINTS)), slowest_speed(model) * BESIDE_MODE)
             points = np.concatenate([points, 1j * np.unique(np.maximum(typical, rest))])
             speed = speeds[-1]
@@ -276,15 +276,15 @@ class _Comparison:
         return np.asarray(np.max(changes, axis=0))
 
 
-def _end_of_drift(A: FloatArray, slowest: float) -> float:
+def _end_of_drift(model: SecondOrderModel, A: FloatArray) -> float:
     """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
 
     A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2.
     """
-    if not np.isfinite(slowest):
+    free = free_motion_count(model.M, model.C, model.K)
+    if free is None:
         return 0.0
-    size = np.abs(np.linalg.eigvals(A))
-    moved = size[size <= MOVED * slowest]
+    moved = np.sort(np.abs(np.linalg.eigvals(A)))[: free.poles]
     twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
     return float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=0.0))
 
