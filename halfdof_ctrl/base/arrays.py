@@ -281,8 +281,14 @@ def is_complex(matrix: Matrix) -> bool:
     return matrix.dtype is not REAL and matrix.dtype != REAL  # the first at once, for all but loaded arrays
 
 
-def is_zero(matrix: Matrix) -> bool:
-    """Return whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices."""
+def is_zero(matrix: Matrix, *others: Matrix) -> bool:
+    """Return whether all entries are zero, at once for the zeros that `zero_matrix` shares and for sparse matrices.
+
+    Models share zeros of one shape, so that of several matrices few have to be looked at.
+    """
+    for other in others:
+        if other is not matrix and not is_zero(other):
+            return False
     if type(matrix) is not np.ndarray and issparse(matrix):
         return bool(matrix.size == 0)  # of stored entries, none of which is zero
     shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)

@@ -99,14 +99,14 @@ def hydromount(
     >>> hydromount().K.tolist()
     [[5500.0, 0.0, -500.0], [0.0, 1000.0, 0.0], [-500.0, 0.0, 1000.0]]
     """
-    if not (is_real_number(m) and math.isfinite(m) and m >= 0.0):
+    if not (is_real_number(m) and 0.0 <= m < math.inf):
         msg = (
             f"m = {shown(m)} kg, but the mass on the mount must be a number that is not negative; 0 for the mount "
             "alone."
         )
         raise ParameterError(msg, parameter="m", value=m)
     for symbol, value in (("K_r", K_r), ("K_rs", K_rs), ("K_v", K_v), ("K_s", K_s), ("C_rs", C_rs), ("C_h", C_h)):
-        if not (is_real_number(value) and math.isfinite(value) and value >= 0.0):
+        if not (is_real_number(value) and 0.0 <= value < math.inf):
             msg = (
                 f"{symbol} = {shown(value)}, but a stiffness [N/m] or damping [N s/m] must be a number that is not "
                 "negative."

@@ -34,6 +34,9 @@ from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.systems.handover import warn_of_python_control
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
+REDUCIBLE = (SecondOrderModel, ExactReduction)  #: what brings its matrices and names with it
+NOTHING = frozenset({type(None)})  #: the type of what is not given
+
 Improper: TypeAlias = Literal["refuse", "drop"]
 
 
@@ -120,8 +123,8 @@ def mech2ss(
         msg = f"improper must be 'refuse' or 'drop', not {shown(improper)}."
         raise ParameterError(msg, parameter="improper", value=improper)
     require_kind(states)
-    if isinstance(model, SecondOrderModel | ExactReduction):
-        if any([value is not None for value in (C, K, B, F, G, H, D, dofs, inputs, outputs, name)]):  # noqa: C419
+    if isinstance(model, REDUCIBLE):
+        if not NOTHING.issuperset(map(type, (C, K, B, F, G, H, D, dofs, inputs, outputs, name))):
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
             raise SignalNameError(msg, names=())
     else:

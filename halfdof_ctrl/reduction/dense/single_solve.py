@@ -16,6 +16,7 @@ from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
+NO_SHIFT: tuple[FloatArray, ...] = ()  #: of (5), where no derivative of the inputs drives the states
 SOLVE_ROUNDING = 32 * EPS  #: times n: what a solution of (3) is known to, of its largest scaled unknown
 
 
@@ -25,7 +26,8 @@ def leading_columns(model: SecondOrderModel, partition: DofPartition) -> FloatAr
     W = np.empty(model.M.shape, order="F")
     W[:, :n_i] = partition.times_basis(model.M, 0, n_i)
     W[:, n_i:moving] = partition.times_basis(model.C, n_i, moving)
-    W[:, moving:] = partition.times_basis(model.K, moving, None)
+    if partition.n_static:
+        W[:, moving:] = partition.times_basis(model.K, moving, None)
     return W
 
 
@@ -33,18 +35,23 @@ def solved_at_once(model: SecondOrderModel, partition: DofPartition, leading: Le
     """Solve (3) for everything on its right-hand side."""
     n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
     m, N = model.B.shape[1], moving + n_i
-    forces = (model.B,) if is_zero(model.Bv) and is_zero(model.Ba) else trimmed(model.quadratics.B)
+    forces = (model.B,) if is_zero(model.Bv, model.Ba) else trimmed(model.quadratics.B)
     right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
-    restoring = partition.times_basis(model.K, 0, moving), partition.times_basis(model.C, 0, n_i)
-    np.concatenate((*restoring, *forces), axis=1, out=right)
-    np.negative(right[:, :N], out=right[:, :N])
+    right[:, :moving] = -partition.times_basis(model.K, 0, moving)
+    right[:, moving:N] = -partition.times_basis(model.C, 0, n_i)
+    for k, matrix in enumerate(forces):
+        right[:, N + k * m : N + (k + 1) * m] = matrix
     solved = leading.solve(right)
     rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
-    np.add(solved[n_i:moving], 0.0, out=rate[n_i:moving])  # adding zero leaves no negative zeros to be printed
-    np.add(solved[:n_i], 0.0, out=rate[moving:])
+    rate[n_i:moving] = solved[n_i:moving]
+    rate[moving:] = solved[:n_i]
+    rate += 0.0  # leaves no negative zeros to be printed
     A = rate[:, :N]
     A[:n_i, moving:] = unit_matrix(n_i)
-    B, shift = absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
+    if len(forces) == 1:
+        B, shift = rate[:, N:], NO_SHIFT
+    else:
+        B, shift = absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     displacement = _displacement(partition, solved, m, shift)
     return StateEquations(A=read_only(A), B=read_only(B), displacement=displacement, shift=shift)
 

@@ -134,12 +134,13 @@ def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: 
     """
     q = equations.displacement
     output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
-    if not is_zero(model.G):
+    moving = not is_zero(model.G, model.H)
+    if moving and not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(equations.A, equations.B))
-    if not is_zero(model.H):
+    if moving and not is_zero(model.H):
         velocity = q.combined(model.H).derivative(equations.A, equations.B)
         output = output.plus(velocity.derivative(equations.A, equations.B))
-    if not (is_zero(model.D) and is_zero(model.Dv) and is_zero(model.Da)):
+    if not is_zero(model.D, model.Dv, model.Da):
         direct = trimmed(model.quadratics.D)
         output = output.plus(Signal(np.zeros_like(output.X), direct))
     if len(output.U) <= 1:
