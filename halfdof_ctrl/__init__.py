@@ -196,6 +196,7 @@ _HOMES = {
     "systems.time_response": "forced_response initial_response step_response",
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names.split()}
+_CORE = "halfdof_ctrl.systems.state_space"  #: comes with the first name, so that no later call pays for the import
 _MODULES = (
     "base",
     "descriptor",
@@ -222,6 +223,7 @@ if not TYPE_CHECKING:  # who checks types knows the names, and is to say of othe
         if name not in _HOME_OF:
             msg = f"module 'halfdof_ctrl' has no attribute {name!r}"
             raise AttributeError(msg)
+        import_module(_CORE)
         value = getattr(import_module(f"halfdof_ctrl.{_HOME_OF[name]}"), name)
         globals()[name] = value
         return value

@@ -103,7 +103,7 @@ class SingleSolve(FromEquations):
         solved = real + 1j * imag
         rate = np.concatenate([np.zeros_like(solved[:n_i]), solved[n_i:moving], solved[:n_i]])
         moved = self.equations.displacement.X @ states.solve(rate)
-        return np.asarray(moved + part.T[:, moving:] @ solved[moving:])
+        return np.asarray(moved + part.from_static(solved[moving:]) if part.n_static else moved)
 
     def inverse_rows(self) -> FloatArray:
         """Return gamma and alpha."""

@@ -7,14 +7,16 @@ They are made by `selection.select_columns` or by `bases.orthonormal_bases`.
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import DenseMatrix, FloatArray, IndexArray, unit_matrix
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray, IndexArray, unit_matrix
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.reduction.algebra.blocks import cancelled
 from halfdof_ctrl.reduction.method.evidence import LightMasses, RankDecision
+
+Numbers = TypeVar("Numbers", FloatArray, ComplexArray)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -95,12 +97,12 @@ class DofPartition:
             return np.asarray(matrix[:, self.order[first:stop]])
         return cancelled(matrix, self.basis[:, first:stop], self.sizes[:, first:stop])
 
-    def from_static(self, static: FloatArray) -> FloatArray:
+    def from_static(self, static: Numbers) -> Numbers:
         """Return ``T_k p_k``, (n, k), for static coordinates p_k, (n_k, k)."""
         first = self.n_inertial + self.n_half
         if self.basis is not None:
             return np.asarray(self.basis[:, first:] @ static)
-        q = np.zeros((self.order.size, static.shape[1]))
+        q = np.zeros((self.order.size, static.shape[1]), dtype=static.dtype)
         q[self.order[first:]] = static
         return q
 
