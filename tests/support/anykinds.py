@@ -257,7 +257,7 @@ def nearly_singular(generator: np.random.Generator, structure: Structure) -> Str
     """
     M = structure.M.astype(float)
     M[tuple(generator.integers(0, structure.size, 2))] += 2.0 ** -int(generator.integers(20, 46))
-    return Structure(structure.kind, M, structure.C, structure.K)  # type: ignore[arg-type]  # floats that act as integers
+    return Structure(structure.kind, M, structure.C, structure.K)  # floats that act as integers
 
 
 @st.composite

@@ -72,9 +72,9 @@ class Improved:
 
 
 def _ball_matrix(values: FloatArray) -> flint.acb_mat:
-    return flint.acb_mat(
-        *values.shape, [flint.acb(value) for value in np.asarray(values, dtype=float).ravel().tolist()]
-    )
+    rows, columns = values.shape
+    entries = [flint.acb(value) for value in np.asarray(values, dtype=float).ravel().tolist()]
+    return flint.acb_mat(int(rows), int(columns), entries)
 
 
 def balanced(A: FloatArray) -> tuple[FloatArray, FloatArray]:

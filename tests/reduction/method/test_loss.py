@@ -68,7 +68,7 @@ def test_what_is_lost_is_what_exact_arithmetic_says(kind: Kind, size: int, seed:
     """Against 600 bits, for the stored numbers and for M, C, K, at the frequency and in the channel that are named."""
     generator = np.random.default_rng([seed, size])
     model = signals(generator, nearly_singular(generator, kind(generator, size)))
-    columns, rows = 8.0 ** np.arange(-4, 4)[:size], 8.0 ** np.arange(3, -5, -1)[:size]
+    columns, rows = np.exp2(np.arange(-12.0, 12.0, 3.0)[:size]), np.exp2(np.arange(9.0, -15.0, -3.0)[:size])
     measured, exact = lost(in_units(model, columns, rows, 8.0**5) if odd_units else model)
     assert measured > 1e-9
     assert_allclose(measured, exact, rtol=SIZE - 1.0)
