@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.doors import shown
+from halfdof_ctrl.base.doors import is_mapping, shown
 from halfdof_ctrl.base.errors import ParameterError
 
 Values: TypeAlias = npt.NDArray[Any]  #: numbers, or objects where the values are something else
@@ -81,7 +81,7 @@ def listed_cases(parameters: Parameters, *, paired: bool = False) -> Cases:
     """
     if parameters is None:
         return Cases(axes={}, parameters={}, fixed={})
-    if isinstance(parameters, Mapping):
+    if is_mapping(parameters):
         _require_names(parameters)
         fixed = {name: value for name, value in parameters.items() if _is_single(value)}
         varied = {name: _as_values(name, value) for name, value in parameters.items() if name not in fixed}
@@ -167,7 +167,7 @@ def _columns(parameters: Iterable[object]) -> dict[str, Values]:
         rows = [] if isinstance(parameters, str | np.ndarray) else list(parameters)
     except Exception:  # noqa: BLE001  # no collection, or one that fails
         rows = []
-    if not rows or not all(isinstance(row, Mapping) for row in rows):
+    if not rows or not all(is_mapping(row) for row in rows):
         msg = (
             "parameters must be a mapping from names to lists of values, or a list of mappings with one value for each "
             f"name, not {type(parameters).__name__}. A pandas table gives the latter by to_dict('records')."
