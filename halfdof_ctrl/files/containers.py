@@ -20,13 +20,13 @@ from halfdof_ctrl.files.formats.mat4 import is_mat4, mat4_variables
 from halfdof_ctrl.files.formats.mat5 import mat5_variables
 from halfdof_ctrl.files.formats.mat73 import is_mat73, mat73_variables
 from halfdof_ctrl.files.formats.npy import SPARSE_PARTS, is_npy, npy_variable, npz_variables
+from halfdof_ctrl.files.formats.text_blocks import LARGEST_WHOLE
 from halfdof_ctrl.files.formats.variables import Variable, require_names_once
 from halfdof_ctrl.files.naming import naming_the_file
 
 PathLike: TypeAlias = str | os.PathLike[str]
 Content: TypeAlias = Mapping[str, Any]
 
-LARGEST_NAME = 2.0**53  #: above it a float64 does not tell neighbouring whole numbers apart
 MATRIX_ENDINGS = (".npz", ".mat")
 ARRAY_ENDINGS = (*MATRIX_ENDINGS, ".npy")
 
@@ -78,7 +78,7 @@ def texts(content: Content, key: str) -> list[str] | None:
     if value is None or isinstance(value, list):
         return value
     array = np.asarray(value)
-    if array.dtype.kind in "iuf" and (array == np.rint(array)).all() and (np.abs(array) < LARGEST_NAME).all():
+    if array.dtype.kind in "iuf" and (array == np.rint(array)).all() and (np.abs(array) < LARGEST_WHOLE).all():
         return [f"{int(number)}" for number in array.reshape(-1).tolist()]
     if array.size and array.dtype.kind not in "US":
         msg = f"{key} must be names, but it holds entries of type {array.dtype}. Give text (in MATLAB a cellstr)."

@@ -189,17 +189,23 @@ def _doubt_gaps(frequencies: FloatArray, path: PathLike) -> None:
     """Warn of a few steps that are longer than all others, which are equal or have equal ratios."""
     grids = [frequencies, *([np.log(frequencies)] if (frequencies > 0.0).all() else [])]
     for grid in grids if frequencies.size > MANY_STEPS else ():
-        steps = np.diff(grid)
-        step = float(np.median(steps)) or np.inf
-        long = steps / step > LONG_STEP
-        if 0 < int(long.sum()) <= FEW_GAPS and (np.abs(steps[~long] / step - 1.0) < EVEN_STEPS).all():
-            line = int(np.argmax(long)) + 3
+        gaps = _gaps(np.diff(grid), EVEN_STEPS)
+        if gaps.any():
+            line = int(np.argmax(gaps)) + 3
             msg = (
                 f"{path}, line {line}: the frequencies leave a gap before it, and all others are spaced alike. If the "
                 "table was not measured so, rows of it are missing."
             )
             give_warning(msg, ImportedModelWarning)
             return
+
+
+def _gaps(steps: FloatArray, even: float) -> npt.NDArray[np.bool_]:
+    """Tell which steps are longer than all others, if they are few and the others are equal, relatively."""
+    ratio = steps / (float(np.median(steps)) or np.inf)
+    long = ratio > LONG_STEP
+    is_gap = 0 < int(long.sum()) <= FEW_GAPS and bool((np.abs(ratio[~long] - 1.0) <= even).all())
+    return long & is_gap
 
 
 def _require_agreement(values: FloatArray, response: ComplexArray, parts: FloatArray, path: PathLike) -> None:
@@ -228,10 +234,8 @@ def _require_times(times: FloatArray, path: PathLike) -> None:
     wrong = ~(steps > 0.0)
     what = "times do not rise"
     if not wrong.any() and steps.size >= MANY_STEPS:
-        step = float(np.median(steps))
-        long = steps > LONG_STEP * step
-        if 0 < int(long.sum()) <= FEW_GAPS and _close(steps[~long], np.full(steps.size - int(long.sum()), step)).all():
-            wrong, what = long, "lines are missing before it: all other steps of time are equal and shorter"
+        wrong = _gaps(steps, ROW_AGREEMENT)
+        what = "lines are missing before it: all other steps of time are equal and shorter"
     if wrong.any():
         line = int(np.argmax(wrong)) + 3
         msg = f"{path}, line {line}: {what}. The file is damaged: write or copy it anew."

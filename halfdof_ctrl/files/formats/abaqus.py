@@ -34,10 +34,10 @@ Keys: TypeAlias = npt.NDArray[np.int64]
 
 LABELLED, UNLABELLED = 5, 3  #: numbers in a line
 KEYWORD_LINE = re.compile(rb"^\*(?!\*)[^\n]*", re.MULTILINE)
-MATRIX_INPUT, LOAD, INCLUDE = "MATRIXINPUT", "CLOAD", "INCLUDE"  #: without blanks, which Abaqus passes over
-KEYWORDS = (MATRIX_INPUT, LOAD, INCLUDE, "MATRIX", "MATRIXASSEMBLE")
+MATRIX_INPUT, LOAD, INCLUDED = "MATRIXINPUT", "CLOAD", "INCLUDE"  #: without blanks, which Abaqus passes over
+KEYWORDS = (MATRIX_INPUT, LOAD, INCLUDED, "MATRIX", "MATRIXASSEMBLE")
 PARAMETERS = ("NAME", "TYPE", "SCALEFACTOR")  #: of *MATRIX INPUT in a file with numbers
-TYPES: dict[str, Declared] = {"SYMMETRIC": "symmetric", "UNSYMMETRIC": "unsymmetric"}
+DECLARED_TYPES: dict[str, Declared] = {"SYMMETRIC": "symmetric", "UNSYMMETRIC": "unsymmetric"}
 LARGEST_LABEL = 2**31 - 1
 INTERNAL = 2**40  #: lifts the keys of internal nodes above those of all others
 COMPONENT_BITS = 16
@@ -106,7 +106,7 @@ def _keywords(content: bytes) -> dict[str, str]:
         shown = line[:60].decode("latin-1").strip()
         word, *parameters = "".join(line[1:].decode("latin-1").upper().split()).split(",")
         named = dict([parameter.partition("=")[::2] for parameter in parameters if parameter])
-        if word == INCLUDE or "INPUT" in named or (word == MATRIX_INPUT and word in said):
+        if word == INCLUDED or "INPUT" in named or (word == MATRIX_INPUT and word in said):
             msg = (
                 "*MATRIX INPUT names another file, or stands there more than once, and one matrix a file is read (and "
                 "none of *INCLUDE). Give the file with the numbers, or write each matrix into its own."
@@ -122,10 +122,10 @@ def _keywords(content: bytes) -> dict[str, str]:
 
 def _declared(said: Mapping[str, str]) -> Declared:
     kind = said.get("TYPE")
-    if kind is not None and kind not in TYPES:
+    if kind is not None and kind not in DECLARED_TYPES:
         msg = f"TYPE={kind[:30]} is neither SYMMETRIC nor UNSYMMETRIC. Write it anew."
         raise FileFormatError(msg, path="")
-    return "unsaid" if kind is None else TYPES[kind]
+    return "unsaid" if kind is None else DECLARED_TYPES[kind]
 
 
 def _scale(said: Mapping[str, str]) -> float:

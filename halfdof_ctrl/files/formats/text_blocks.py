@@ -22,7 +22,6 @@ NEWLINE, BLANK_BYTES = 10, 32  #: bytes; what is not above the second cannot be 
 TAIL = 4096  #: bytes at the end of a text that are looked at
 FEWEST_LINES = 2  #: whose last numbers tell how long such a number is
 WRITTEN_FULL = 9  #: characters: longer numbers of one length are those of a format, not of chance
-EMPTY_AND_ONE = 2  #: tables: the one without rows that is always there, and another
 WIDE_ROW = 4096  #: numbers; longer rows are parsed in pieces ...
 WIDE_PIECE = 2**15  #: ... of so many bytes
 TOO_LONG = "a line has more than its fields"
@@ -62,7 +61,7 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
     >>> number_rows(b"1,1, 2,1, -3.5D+02\n", 5, comment="*").tolist()
     [[1.0, 1.0, 2.0, 1.0, -350.0]]
     """
-    tables = [np.empty((0, columns))]
+    tables: list[FloatArray] = []
     for block, line in _blocks(content, first_line):
         text = block.translate(AS_PYTHON)
         marked = comment.encode() in text
@@ -78,7 +77,9 @@ def number_rows(content: bytes, columns: int, *, comment: str, first_line: int =
         if table.size and (table.shape[1] != columns or not np.isfinite(table).all()):
             raise _bad_row(text, columns, comment, line)
         tables.append(table.reshape(-1, columns))
-    return tables[-1] if len(tables) <= EMPTY_AND_ONE else np.concatenate(tables)  # a copy takes as much again
+    if not tables:
+        return np.empty((0, columns))
+    return tables[0] if len(tables) == 1 else np.concatenate(tables)  # a copy takes as much again
 
 
 def _wide_rows(text: bytes, columns: int, comment: str) -> FloatArray:
@@ -127,8 +128,16 @@ def printable(text: bytes) -> str:
     >>> printable(b"KA\nX")
     'KA?X'
     """
-    words = text.decode("latin-1").strip(" \0\r\n\t")
-    return "".join([letter if letter.isprintable() else "?" for letter in words])
+    return visible(text.decode("latin-1").strip(" \0\r\n\t"))
+
+
+def visible(text: str) -> str:
+    r"""Put a question mark in the place of each letter that cannot be seen.
+
+    >>> visible("K\x1b[2J")
+    'K?[2J'
+    """
+    return "".join([letter if letter.isprintable() else "?" for letter in text])
 
 
 def is_cut_short(content: bytes) -> bool:

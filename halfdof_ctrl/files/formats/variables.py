@@ -10,6 +10,7 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.errors import FileFormatError
+from halfdof_ctrl.files.formats.text_blocks import visible
 
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Value: TypeAlias = npt.NDArray[Any] | csc_array | list[str]
@@ -34,9 +35,7 @@ class Variable:
 
     def __post_init__(self) -> None:
         """Take away what a terminal would obey in the name."""
-        if not self.name.isprintable():
-            shown = "".join([letter if letter.isprintable() else "?" for letter in self.name])
-            object.__setattr__(self, "name", shown)
+        object.__setattr__(self, "name", visible(self.name))
 
     @property
     def is_matrix(self) -> bool:
