@@ -40,7 +40,7 @@ from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
 OUTER_BLOCK = 24  #: states whose substitution is done before the rest is updated by one matrix product
-INNER_BLOCK = 4
+INNER_BLOCK = 4  #: states within that, before the rest of the block is updated by another
 POINT_ENTRIES = 2**21  #: complex entries of states held at a time (32 MB)
 POINTS_AT_ONCE = 1024  #: points at a time of so few states that a product of an inner block stays on one thread
 HUGE, TINY = 2.0**400, 2.0**-400  #: a solution that grows beyond the one is scaled by the other

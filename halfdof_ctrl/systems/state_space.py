@@ -35,7 +35,7 @@ from halfdof_ctrl.systems.handover import warn_of_python_control
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 REDUCIBLE = (SecondOrderModel, ExactReduction)  #: what brings its matrices and names with it
-NOTHING = frozenset({type(None)})  #: the type of what is not given
+NOT_GIVEN = frozenset({type(None)})  #: the type of what is not given
 
 Improper: TypeAlias = Literal["refuse", "drop"]
 
@@ -124,7 +124,7 @@ def mech2ss(
         raise ParameterError(msg, parameter="improper", value=improper)
     require_kind(states)
     if isinstance(model, REDUCIBLE):
-        if not NOTHING.issuperset(map(type, (C, K, B, F, G, H, D, dofs, inputs, outputs, name))):
+        if not NOT_GIVEN.issuperset(map(type, (C, K, B, F, G, H, D, dofs, inputs, outputs, name))):
             msg = "A model brings its matrices and names with it: use model.select() or mechss() to change them."
             raise SignalNameError(msg, names=())
     else:
