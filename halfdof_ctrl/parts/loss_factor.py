@@ -350,9 +350,7 @@ def _require_options(keep: Keep, branches: int | None, tol: float) -> None:
     if not is_choice(keep, get_args(Keep)):
         msg = f"keep must be one of {listed(get_args(Keep))}, not {shown(keep)}."
         raise ParameterError(msg, parameter="keep", value=keep)
-    if branches is not None and not (
-        is_real_number(branches) and is_whole_number(branches) and 0 < branches <= LOSS_FACTOR_MOST_BRANCHES
-    ):
+    if branches is not None and not (is_whole_number(branches) and 0 < branches <= LOSS_FACTOR_MOST_BRANCHES):
         msg = f"branches = {shown(branches)}, but it must be a whole number from 1 to {LOSS_FACTOR_MOST_BRANCHES}."
         raise ParameterError(msg, parameter="branches", value=branches)
     if not (isinstance(tol, int | float) and 0.0 < tol < 1.0):

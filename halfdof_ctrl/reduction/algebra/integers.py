@@ -16,8 +16,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
 PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
-DOUBLE_DIGITS = 53  #: binary ones of a double
-SPARE_DIGITS = 2  #: that are zero in a number that was not rounded
+UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
 
@@ -158,15 +157,15 @@ def _determinants(work: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
     return value
 
 
-def has_short_entries(values: FloatArray) -> bool:
-    """Return whether no entry of an array fills the digits of a double, as nearly all that were rounded do.
+def has_short_entries(values: FloatArray, bits: int = UNROUNDED_BITS) -> bool:
+    """Return whether no entry has more than some bits, by default so many that nearly all that were rounded have more.
 
     Examples
     --------
     >>> has_short_entries(np.array([[3.0, 1.0 + 2.0**-45]])), has_short_entries(np.array([[0.1, 3.0]]))
     (True, False)
     """
-    return not np.any(np.ldexp(np.frexp(values)[0], DOUBLE_DIGITS - SPARE_DIGITS) % 1.0)
+    return not np.any(np.ldexp(np.frexp(values)[0], bits) % 1.0)
 
 
 def _eliminate(work: IntegerArray, n: int) -> int:

@@ -21,7 +21,13 @@ import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.reduction.algebra.integers import IntegerArray, as_floats, as_integers, solved_exactly
+from halfdof_ctrl.reduction.algebra.integers import (
+    IntegerArray,
+    as_floats,
+    as_integers,
+    has_short_entries,
+    solved_exactly,
+)
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
 from halfdof_ctrl.reduction.deflation.row_system import (
     Caution,
@@ -32,7 +38,7 @@ from halfdof_ctrl.reduction.deflation.row_system import (
     tight_places,
 )
 
-SHORT_BITS = 24  #: bits of numbers that are taken for exact
+SHORT_BITS = 24  #: bits of numbers that can be meant to the last one: 3 and 0.625, but not 0.1
 LONGEST_INTEGER = 320  #: bits of integers that are kept as they are: exact numbers of small models are shorter
 KEPT_BITS = 160  #: bits of those that are rounded: three times as many as the numbers that were given have
 
@@ -61,7 +67,7 @@ class ExactRows(RowSystem):
             powers=tuple([power for _, power in found]),
             operations=np.eye(system.size)[None],
             given=system.coefficients,
-            exact=_are_short(system.coefficients),
+            exact=has_short_entries(system.coefficients, SHORT_BITS),
         )
 
     def replaced(self, offsets: Offsets, eliminations: list[Elimination], caution: Caution) -> "ExactRows":
@@ -188,12 +194,6 @@ class _Draft:
 def _bits(weight: int, power: int) -> int:
     """Tell about how large a row of size one is after it was multiplied, as a power of two."""
     return abs(weight).bit_length() + power if weight else -(10**9)
-
-
-def _are_short(values: FloatArray) -> bool:
-    """Return whether numbers have so few bits that they can be meant to the last one: 3 and 0.625, but not 0.1."""
-    fractions = np.ldexp(np.frexp(values)[0], SHORT_BITS)
-    return bool((fractions == np.rint(fractions)).all())
 
 
 def _quotient(weight: int, divisor: int, power: int) -> float:

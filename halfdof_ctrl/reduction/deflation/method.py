@@ -39,7 +39,7 @@ from halfdof_ctrl.reduction.method.loss import Loss, measured_loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_solver
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_solver, sizes_at
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
@@ -94,8 +94,7 @@ class Deflation(FromEquations):
     def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         """Return the response of all DOFs to forces."""
         P = self.model.quadratics.P
-        speed = float(np.abs(states.points).max())
-        scaling = max_scaling(np.abs(P[0]) + np.abs(P[1]) * speed + np.abs(P[2]) * speed**2, even=2.0)
+        scaling = max_scaling(sizes_at(P, float(np.abs(states.points).max())), even=2.0)
         solve = pencil_solver([scaling.of(part) for part in P], states.points)
         return np.asarray(scaling.columns[:, None] * solve(scaling.rows[:, None] * force))
 

@@ -18,7 +18,15 @@ from halfdof_ctrl.reduction.dense.selection import select_columns
 from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
-from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, is_well_conditioned, loses_nothing, measured_loss
+from halfdof_ctrl.reduction.method.loss import (
+    NOTHING_LOST,
+    Loss,
+    is_well_conditioned,
+    loses_nothing,
+    loss_of,
+    measured,
+    measured_loss,
+)
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
@@ -170,13 +178,14 @@ def _chosen(found: SingleSolve, tol: float | None, *, asked: bool) -> SingleSolv
     """
     if tol is not None or _loses_nothing(found):
         return found
-    measured = replace(found, loss=measured_loss(found))
-    if measured.loss.value > ALLOWED_LOSS and _is_ordinary(found):
-        return replace(found, loss=measured_loss(found, allowed=TEN_TIMES_DATA))
-    if asked or measured.loss.value < LOSS_LOOKED_AT:
-        return measured
+    measurement = measured(found)
+    known = replace(found, loss=loss_of(measurement))
+    if known.loss.value > ALLOWED_LOSS and _is_ordinary(found):
+        return replace(found, loss=loss_of(measurement, allowed=TEN_TIMES_DATA))
+    if asked or known.loss.value < LOSS_LOOKED_AT:
+        return known
     better = _in_better_coordinates(found)
-    return measured if better is None else replace(better, loss=measured_loss(better))
+    return known if better is None else replace(better, loss=measured_loss(better))
 
 
 def _loses_nothing(found: SingleSolve) -> bool:

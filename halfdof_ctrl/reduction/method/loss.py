@@ -14,11 +14,20 @@ docs/explanation/evaluation.md.
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, Matrix, has_even_entries, powers_of_two
+from halfdof_ctrl.base.arrays import (
+    EPS,
+    ComplexArray,
+    FloatArray,
+    IndexArray,
+    Matrix,
+    as_dense,
+    has_even_entries,
+    powers_of_two,
+)
 from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.free_motions import free_motion_count
@@ -34,11 +43,12 @@ from halfdof_ctrl.reduction.method.refined_answers import (
     StateSolver,
     pencil_solver,
     refined_response,
+    sizes_at,
     sizes_of_terms,
 )
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
-TYPICAL_POINTS = (0.2j, 0.55j, 1.6j, 4.4j)  #: looked at in a model of few DOFs as well, in units of its time scale
+TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 DRIFT = 1e-12  #: part of a value that poles of free motions, which rounding has moved from the origin, may change
@@ -97,6 +107,15 @@ class _Measured:
     grown: FloatArray  #: size of the part of it that grows with frequency
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """What was found at the frequencies that are looked at."""
+
+    model: SecondOrderModel
+    chosen: IndexArray  #: (k,) which inputs
+    found: Sequence[tuple[ComplexArray, _Measured]]  #: points, and what is lost there
+
+
 def is_well_conditioned(A: FloatArray) -> bool:
     """Return whether the condition number of A is below a thousand, so that solving with it loses three digits at most.
 
@@ -125,11 +144,9 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
     [True, False]
     """
     A, q = equations.A, equations.displacement
+    scale: FloatArray | float = 1.0
     if not len(A) or equations.shift:
         return not len(A)
-    if even and not q.U:
-        return True
-    scale = np.ones((len(A), 1))
     if not even:
         if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part) for part in model.quadratics.P):
             return False
@@ -145,17 +162,28 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
     return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
 
 
-def measured_loss(stored: Stored, allowed: float = 0.0) -> Loss:
-    """Measure what A, B, C, D lose, relative to each channel's value at the frequencies that are looked at.
+def measured_loss(stored: Stored) -> Loss:
+    """Measure what A, B, C, D lose, relative to each channel's value at the frequencies that are looked at."""
+    return loss_of(measured(stored))
+
+
+def measured(stored: Stored) -> Measurement:
+    """Compare the stored system with the model at the frequencies that are looked at, for `loss_of` to judge."""
+    comparison = _Comparison.of(stored)
+    points = comparison.points
+    groups = [points] if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
+    found = [part for group in groups for part in comparison.tried(group)]
+    return Measurement(stored.model, comparison.chosen, found)
+
+
+def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
+    """Return what is lost, where that is most.
 
     Relative to a thousandth of what the channel is at some lower frequency, or to its part that grows with frequency
     and is in no state space, where these are larger. What is at most `allowed` times what rounding of M, C and K at
     random changes is none.
     """
-    comparison = _Comparison.of(stored)
-    points = comparison.points
-    groups = [points] if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
-    found = [part for group in groups for part in comparison.tried(group)]
+    found = measurement.found
     if not found:
         return NOTHING_LOST
     at = np.concatenate([where for where, _ in found])
@@ -175,8 +203,8 @@ def measured_loss(stored: Stored, allowed: float = 0.0) -> Loss:
     return Loss(
         float(np.nan_to_num(relative[k, i, j], nan=np.inf)),
         float(abs(at[k])),
-        stored.model.outputs[i],
-        stored.model.inputs[int(comparison.chosen[j])],
+        measurement.model.outputs[i],
+        measurement.model.inputs[int(measurement.chosen[j])],
     )
 
 
@@ -208,12 +236,12 @@ class _Comparison:
             speeds = _typical_speeds(model)
             points = points[np.abs(points) > SLOWEST_SPEED * min(speeds)]
             rest = _end_of_drift(model, stored.A)
-            typical = np.append(np.outer(speeds, np.abs(TYPICAL_POINTS)), slowest_speed(model) * BESIDE_MODE)
+            typical = np.append(np.outer(speeds, TYPICAL_SPEEDS), slowest_speed(model) * BESIDE_MODE)
             points = np.concatenate([points, 1j * np.unique(np.maximum(typical, rest))])
             speed = speeds[-1]
-        rows, columns = scaling = max_scaling(_terms(model.quadratics.P, speed), even=2.0)
+        rows, columns = scaling = max_scaling(sizes_at(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
-        inputs = powers_of_two(np.asarray(_terms(B, speed)).max(axis=0, initial=0.0))
+        inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
         motion = Equations(
             R=[_scaled(part, rows, columns) for part in model.quadratics.P],
             B=[part * inputs for part in B],
@@ -302,19 +330,9 @@ def _typical_speeds(model: SecondOrderModel) -> list[float]:
     return [float(np.exp2(log)) for log in logs]
 
 
-def _terms(coefficients: Sequence[Matrix], speed: float) -> Any:  # noqa: ANN401  # a matrix of the kind that is given
-    """Return ``|K| + |C| speed + |M| speed^2``."""
-    parts: list[Any] = list(coefficients)
-    total = abs(parts[0])
-    for k, part in enumerate(parts[1:], 1):
-        total = total + abs(part) * speed**k
-    return total
-
-
 def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:
     """Return columns of a polynomial's coefficients, dense."""
-    parts = [part[:, chosen] for part in coefficients]
-    return [np.asarray(part if isinstance(part, np.ndarray) else part.toarray()) for part in parts]
+    return [np.asarray(as_dense(part[:, chosen])) for part in coefficients]
 
 
 def _scaled(matrix: Matrix, rows: FloatArray, columns: FloatArray) -> Matrix:

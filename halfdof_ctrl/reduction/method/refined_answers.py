@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg.lapack import zgetrf, zgetrs
 from scipy.sparse import csc_array, diags_array, hstack
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, as_dense, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 
@@ -97,6 +97,15 @@ def sizes_of_terms(coefficients: Sequence[Matrix], s: ComplexArray, x: ComplexAr
     return np.asarray(sum(np.asarray(abs(part) @ np.abs(s**k * x)) for k, part in enumerate(coefficients)))
 
 
+def sizes_at(coefficients: Sequence[Matrix], speed: float) -> Any:  # noqa: ANN401  # a matrix of the kind that is given
+    """Return ``|K| + |C| speed + |M| speed^2``."""
+    parts: list[Any] = list(coefficients)
+    total = abs(parts[0])
+    for k, part in enumerate(parts[1:], 1):
+        total = total + abs(part) * speed**k
+    return total
+
+
 def _beside(left: Matrix, units: FloatArray, right: FloatArray) -> Matrix:
     """Put a matrix, whose unknowns are measured in some units, and one of inputs side by side."""
     if isinstance(left, np.ndarray):
@@ -155,7 +164,7 @@ def pencil_solver(P: Sequence[Matrix], points: ComplexArray) -> Solver:
     numpy.linalg.LinAlgError
         A point is an eigenvalue.
     """
-    dense = [part if isinstance(part, np.ndarray) else part.toarray() for part in P]
+    dense = [as_dense(part) for part in P]
     factors = [factorized(np.asarray(sum(s**k * part for k, part in enumerate(dense)))) for s in points.tolist()]
 
     def solve(right: ComplexArray) -> ComplexArray:

@@ -134,10 +134,9 @@ def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: 
     """
     q = equations.displacement
     output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
-    moving = not is_zero(model.G, model.H)
-    if moving and not is_zero(model.G):
+    if not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(equations.A, equations.B))
-    if moving and not is_zero(model.H):
+    if not is_zero(model.H):
         velocity = q.combined(model.H).derivative(equations.A, equations.B)
         output = output.plus(velocity.derivative(equations.A, equations.B))
     if not is_zero(model.D, model.Dv, model.Da):

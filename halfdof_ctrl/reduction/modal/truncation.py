@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, read_only
@@ -262,9 +263,7 @@ def _measured(
     for k, point in enumerate(progress(s.tolist(), "frequencies")):
         desired[:, :, k] = full.at(point)
         limit.append(full.limit.of_entries_known_to(model.known_to).data)
-    sound = np.isfinite(found) & np.isfinite(desired)
-    found, desired = (np.where(sound, part, 0.0) for part in (found, desired))  # no infinity less another
-    difference, size = np.abs(found - desired), np.abs(desired)
+    sound, difference, size = _compared(found, desired)
     errors, data = (_relative(part, size) for part in (difference, np.where(sound, np.stack(limit, axis=2), 0.0)))
     fields = {letter: getattr(small, letter) for letter in LETTERS}
     truncated = TruncatedModel(
@@ -362,6 +361,13 @@ def _relative(difference: FloatArray, size: FloatArray) -> FloatArray:
     return np.asarray(difference / np.where(largest > 0.0, largest, every))
 
 
+def _compared(found: ComplexArray, desired: ComplexArray) -> tuple[npt.NDArray[np.bool_], FloatArray, FloatArray]:
+    """Return where two responses are finite, how far they are apart there, and the size of the second."""
+    sound = np.isfinite(found) & np.isfinite(desired)
+    found, desired = (np.where(sound, part, 0.0) for part in (found, desired))  # no infinity less another
+    return sound, np.abs(found - desired), np.abs(desired)
+
+
 def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float) -> FloatArray:
     """Return frequencies of the band [Hz] at which the modes above it matter most: those left out matter there too."""
     count = min(CANDIDATES, int(MEASURING_EFFORT / len(small.dofs) ** 3))
@@ -376,9 +382,7 @@ def _doubtful(small: SecondOrderModel, motions: Motions, low: float, top: float)
     frequencies = np.geomspace(low, top, count)
     s = 2j * np.pi * frequencies
     found, desired = fewer(s, squeeze=False), small(s, squeeze=False)
-    sound = np.isfinite(found) & np.isfinite(desired)
-    found, desired = (np.where(sound, part, 0.0) for part in (found, desired))  # no infinity less another
-    difference, size = np.abs(found - desired), np.abs(desired)
+    _, difference, size = _compared(found, desired)
     expected = _relative(difference, size).max(axis=(0, 1))
     peaks = np.flatnonzero((expected >= np.append(expected[1:], 0.0)) & (expected >= np.append(0.0, expected[:-1])))
     return np.asarray(frequencies[peaks[np.argsort(-expected[peaks])[:DOUBTFUL_POINTS]]])
