@@ -6,14 +6,14 @@ with it, and what of that a user must know is warned of once, here.
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY
 from halfdof_ctrl.base.doors import is_choice, shown
-from halfdof_ctrl.base.errors import ModelSizeError, ParameterError, SingularPencilError
+from halfdof_ctrl.base.errors import ModelSizeError, ParameterError
 from halfdof_ctrl.model.dense_copy import complex_model_error
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.deflation.method import by_deflation
 from halfdof_ctrl.reduction.dense.method import by_bases, by_selection
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
-from halfdof_ctrl.reduction.method.exact_order import not_singular_error, warn_of_hidden_states
+from halfdof_ctrl.reduction.method.exact_order import warn_of_hidden_states
 from halfdof_ctrl.reduction.method.file_digits import warn_of_file_digits
 from halfdof_ctrl.reduction.method.protocol import METHODS, MethodName, ReductionMethod
 from halfdof_ctrl.reduction.sparse.method import by_sparse_bases, by_sparse_selection
@@ -88,24 +88,13 @@ def exact_reduction(
     _require_valid(tol, method)
     solution = _sparsely_solved(model, tol, method) if model.is_sparse else None
     if solution is None:
-        solution = _solved_or_refused(model.as_dense() if model.is_sparse else model, tol, method)
+        solution = _solved(model.as_dense() if model.is_sparse else model, tol, method)
     evidence = solution.evidence
     evidence.warn(tol)
     if tol is None and solution.name != "selection" and not evidence.is_doubtful:
         warn_of_hidden_states(model, len(solution.A))
     warn_of_file_digits(model, evidence.rcond, tol)
     return ExactReduction(model=solution.model, solution=solution, tol=tol)
-
-
-def _solved_or_refused(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> ReductionMethod:
-    """Solve it, and call it uncertain and not singular if rounding alone could have made what makes it regular."""
-    try:
-        return _solved(model, tol, method)
-    except SingularPencilError as refusal:
-        uncertain = not_singular_error(model, refusal)
-        if uncertain is None:
-            raise
-        raise uncertain from refusal
 
 
 def _solved(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> ReductionMethod:

@@ -26,6 +26,7 @@ from halfdof_ctrl.reduction.algebra.integers import (
     as_floats,
     as_integers,
     has_short_entries,
+    independent_of,
     solved_exactly,
 )
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
@@ -54,8 +55,8 @@ class ExactRows(RowSystem):
     exact: bool  #: whether the numbers given are short, all that counted as zero was zero, and nothing was rounded
 
     @classmethod
-    def of(cls, system: RowSystem) -> "ExactRows":
-        """Take a system as it is, before any row operation."""
+    def of(cls, system: RowSystem, bits: int = SHORT_BITS) -> "ExactRows":
+        """Take a system as it is, before any row operation; numbers of so many bits are meant to the last one."""
         found = [as_integers(system.coefficients[:, i]) for i in range(system.size)]
         return cls(
             coefficients=system.coefficients,
@@ -67,7 +68,7 @@ class ExactRows(RowSystem):
             powers=tuple([power for _, power in found]),
             operations=np.eye(system.size)[None],
             given=system.coefficients,
-            exact=has_short_entries(system.coefficients, SHORT_BITS),
+            exact=has_short_entries(system.coefficients, bits),
         )
 
     def replaced(self, offsets: Offsets, eliminations: list[Elimination], caution: Caution) -> "ExactRows":
@@ -91,7 +92,8 @@ class ExactRows(RowSystem):
             return np.zeros((0, len(group)), dtype=object), 1
         part = level_scaled(self, offsets, offsets.tight(self.matrix), sources, columns)
         _, _, order = scipy.linalg.qr(part.matrix, mode="economic", pivoting=True)
-        chosen = columns[np.sort(order[: sources.size])]
+        whole = self.tight_integers(offsets, sources, columns)
+        chosen = columns[np.sort(independent_of(whole.T, order.tolist(), sources.size))]
         dependent = np.array([item.row for item in group], dtype=np.intp)
         J = self.tight_integers(offsets, np.concatenate([sources, dependent]), chosen)
         return solved_exactly(J[: sources.size].T, J[sources.size :].T)

@@ -2,7 +2,8 @@
 
 Decisions at the edge of rounding can be wrong. A deflation is taken only if it passes equation (19); where it
 does not, or where a pencil is called singular whose P(s) is not, the decisions are taken again with more or less
-caution about rounding errors. If none passes, the model is refused.
+caution about rounding errors, and with none at all in exact arithmetic. If none passes, the model is refused. A small
+model whose numbers were not rounded is not called singular if these are regular, however nearly they cancel.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,7 +25,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilE
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
-from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, UNROUNDED_BITS
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
@@ -34,6 +35,7 @@ from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, 
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import Loss, measured_loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
@@ -159,19 +161,22 @@ def _proposals(model: SecondOrderModel, tol: float | None, decisions: list[Block
     """Yield deflations that pass (19), or any where `tol` was given, with the decisions of the last one."""
     rows, units, pencil = scaled_pencil(model)
     system = RowSystem.scaled(rows)
-    found_before = False
+    found_before = barely = False
     for tried, caution in _ways(system, exactly=tol is None and system.size <= LARGEST_EXACT):
         if found_before and not isinstance(tried, ExactRows):
             return  # other cautions do not bring back digits
         relaxation = relaxed(tried, caution, tol)
         decisions[:] = relaxation.decisions
         if relaxation.offsets is None:
-            if not found_before and pencil.is_singular():
-                raise _singular_error(model, pencil)
+            if not found_before and not barely and pencil.is_singular():
+                if exact_order(model) in {None, -1}:
+                    raise _singular_error(model, pencil)
+                barely = True
             continue
         result, certified = _realized(relaxation, relaxation.offsets, caution, pencil)
         if certified or tol is not None:
-            yield _in_model_units(model, tol, relaxation, result, units, pencil, altered=not certified)
+            given = _in_model_units(model, tol, relaxation, result, units, pencil)
+            yield replace(given, evidence=replace(given.evidence, altered=not certified, barely=barely))
             found_before = True
 
 
@@ -182,7 +187,7 @@ def _realized(
     result, certain = realized(relaxation.system, offsets, caution), False
     if isinstance(relaxation.system, ExactRows):
         result = solved_without_rounding(result, relaxation.system)
-        certain = relaxation.system.exact and caution is not AS_GIVEN
+        certain = relaxation.system.exact
     return result, certain or pencil.has_spectrum(result.equations.A)
 
 
@@ -193,7 +198,7 @@ def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caut
         yield system, CAUTIONS[0]
     if rows is not None:
         yield rows, CAUTIONS[0]
-        yield rows, AS_GIVEN
+        yield ExactRows.of(system, UNROUNDED_BITS), AS_GIVEN
     for caution in CAUTIONS:
         yield system, caution
 
@@ -205,8 +210,6 @@ def _in_model_units(
     result: Realization,
     units: Units,
     pencil: ScaledPencil,
-    *,
-    altered: bool,
 ) -> Deflation:
     losses = pencil.losses(result.equations)
     known_to = np.maximum(
@@ -225,8 +228,7 @@ def _in_model_units(
         evidence=Evidence(
             decisions=tuple([_decision(model, decision) for decision in relaxation.decisions]),
             rcond=result.rcond,
-            loss=Loss(losses.worst),
-            altered=altered,
+            loss=Loss(losses.worst, losses.worst),
         ),
         tol=tol,
     )

@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, read_only
+from halfdof_ctrl.reduction.algebra.integers import independent_of
 from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
 from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
 from halfdof_ctrl.reduction.deflation.relaxation import independent_rows
@@ -173,6 +174,11 @@ class Chain:
             part = unit_free(system, offsets, J, rows, columns).matrix
             part = part / np.abs(part).max(axis=1, keepdims=True, initial=0.0)
             picked = independent_rows(part.T, np.zeros((0, rows.size)), rows.size, STATE_PIVOT_SHARE)
+            exactly = system.tight_integers(offsets, rows, columns)
+            if exactly is not None:
+                others = np.setdiff1d(np.arange(columns.size), picked)
+                order = [*picked.tolist(), *others.tolist()]
+                picked = np.array(independent_of(exactly.T, order, rows.size), dtype=np.intp)
             determined.append(np.sort(columns[picked]))
         return cls(system=system, offsets=offsets, J=J, determined=tuple(determined))
 

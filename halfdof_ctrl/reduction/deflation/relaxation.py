@@ -21,6 +21,7 @@ import scipy.linalg
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
 from halfdof_ctrl.reduction.algebra.blocks import ENTRY_NOISE, RANK_TOLERANCE
+from halfdof_ctrl.reduction.algebra.integers import IntegerArray, independent_of
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold
 from halfdof_ctrl.reduction.deflation.offsets import Offsets, irreducible_blocks, structural_offsets
 from halfdof_ctrl.reduction.deflation.row_system import Caution, Elimination, RowSystem, level_scaled
@@ -103,6 +104,7 @@ class _Block:
     variance: FloatArray  #: mean squares of its errors
     row_factors: FloatArray
     decision: BlockDecision
+    integers: IntegerArray | None  #: the block without rounding, if that decides
 
     @classmethod
     def of(
@@ -130,10 +132,16 @@ class _Block:
             values = scipy.linalg.svdvals(matrix)
         if tol is None:
             bound = gap_threshold(values, bound, bound * UNCLEAR_TIGHT_RANK)
+        rank, integers = int(np.count_nonzero(values > bound)), None
+        if caution.is_none and tol is None:
+            integers = system.tight_integers(offsets, rows, columns)
+        if integers is not None:
+            rank = len(independent_of(integers, range(rows.size)))
+            bound = float(values[rank]) if rank < rows.size else 0.0
         decision = BlockDecision(
             unknowns=columns,
             singular_values=values,
-            rank=int(np.count_nonzero(values > bound)),
+            rank=rank,
             bound=bound,
             noise=max(
                 ENTRY_NOISE * rows.size * float(values[0]),
@@ -148,6 +156,7 @@ class _Block:
             variance=variance,
             row_factors=row_factors,
             decision=decision,
+            integers=integers,
         )
 
     def eliminations(self) -> list[Elimination]:
@@ -156,12 +165,26 @@ class _Block:
         found: list[Elimination] = []
         for times in np.unique(self.times)[::-1].tolist():
             group = np.flatnonzero(self.times == times)
+            if self.integers is not None:
+                before = len(taken)
+                taken = independent_of(self.integers, [*taken, *group.tolist()])
+                sources = np.array(taken, dtype=np.intp)
+                found.extend(self._exactly_expressed(np.setdiff1d(group, sources[before:]), sources))
+                continue
             values = scipy.linalg.svdvals(self.matrix[self.times >= times])
             rank = int(np.count_nonzero(values > self.decision.bound))
             picked = independent_rows(self.matrix[group], self.matrix[taken], rank - len(taken), ROW_PIVOT_SHARE)
             taken.extend(group[picked].tolist())
             found.extend(self._expressed(np.setdiff1d(group, group[picked]), np.array(taken, dtype=np.intp)))
         return found
+
+    def _exactly_expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[Elimination]":
+        """Leave the multipliers to the rows themselves."""
+        none = np.zeros(sources.size)
+        return [
+            Elimination(row=row, columns=self.columns, sources=self.rows[sources], multipliers=none, errors=none)
+            for row in self.rows[dependent].tolist()
+        ]
 
     def _expressed(self, dependent: IndexArray, sources: IndexArray) -> "list[Elimination]":
         if dependent.size == 0:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
+from halfdof_ctrl.reduction.algebra.integers import IntegerArray
 from halfdof_ctrl.reduction.algebra.scaling import gap_threshold, level_scaling
 from halfdof_ctrl.reduction.deflation.offsets import BoolArray, Offsets
 from halfdof_ctrl.reduction.method.units import ScaledRows
@@ -24,6 +25,11 @@ class Caution:
 
     entry: float
     rank: float
+
+    @property
+    def is_none(self) -> bool:
+        """Whether numbers are what they are to the last digit."""
+        return self.entry == 0.0 == self.rank
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -67,6 +73,10 @@ class RowSystem:
     def matrix(self) -> FloatArray:
         """Coefficients of P, (k, n, n)."""
         return self.coefficients[:, :, : self.size]
+
+    def tight_integers(self, offsets: Offsets, rows: IndexArray, columns: IndexArray) -> IntegerArray | None:  # noqa: ARG002
+        """Return a part of J without rounding, each row times a power of two; None where rows have been rounded."""
+        return None
 
     def replaced(self, offsets: Offsets, eliminations: list[Elimination], caution: Caution) -> "RowSystem":
         """Apply (17) to the dependent rows; their sources stay as they are."""

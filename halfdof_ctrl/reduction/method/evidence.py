@@ -84,6 +84,7 @@ class Evidence:
     light: LightMasses | None = None  #: masses that hardly count
     loss: Loss = NOTHING_LOST  #: by the rounding of A, B, C and D; nothing where rcond says that it is none
     hardly: bool = False  #: whether rcond is near rounding, so that the number of states rests on it
+    barely: bool = False  #: whether P(s) is singular to working precision, but not as its entries are stored
     altered: bool = False  #: whether `tol` made a state space that has another spectrum than the model, (19)
 
     @property
@@ -106,6 +107,8 @@ class Evidence:
         _warn_of_close_decisions(self.decisions)
         if self.hardly:
             _warn_of_hardly_regular(self.rcond)
+        if self.barely:
+            _warn_of_barely_regular()
         _warn_of_lost_digits(self.loss, self.rcond)
 
 
@@ -125,6 +128,16 @@ def _warn_of_hardly_regular(rcond: float) -> None:
     give_warning(msg, CloseDecisionWarning)
 
 
+def _warn_of_barely_regular() -> None:
+    msg = (
+        "det P(s) vanishes at every s to working precision: only parts of M, C, K that rounding could have made, had "
+        "their entries been rounded, give the equations one solution. They are taken as they are stored, for they have "
+        "few digits. Look for entries that nearly cancel: mend them if they should, or give the DOFs the mass, damper "
+        "or spring that is meant."
+    )
+    give_warning(msg, CloseDecisionWarning)
+
+
 def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
     """Warn where what is stored loses more than 1e-9 of a channel."""
     if loss.value > ALLOWED_LOSS:
@@ -134,9 +147,9 @@ def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
             else "some states are far faster than others, as DOFs with hardly any mass or damping make them"
         )
         msg = (
-            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.value:.1e} of "
+            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.there:.1e} of "
             f"{loss.output} from {loss.source} at {loss.omega:.3g} rad/s: terms cancel in them that are "
-            f"{loss.value / EPS:.0e} times as large as what they leave, since {cause}. "
+            f"{loss.there / EPS:.0e} times as large as what they leave, since {cause}. "
             "descriptor_response keeps the digits."
         )
         give_warning(msg, LostDigitsWarning)

@@ -8,8 +8,7 @@ not called singular that is not.
 
 import numpy as np
 
-from halfdof_ctrl.base.errors import CloseDecisionWarning, SingularPencilError, UncertainRankError, give_warning
-from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.integers import degree_of_determinant, has_short_entries
 
@@ -46,17 +45,3 @@ def warn_of_hidden_states(model: SecondOrderModel, order: int) -> None:
             "were not rounded. Pass tol to say what counts as zero, or mend entries that should cancel."
         )
         give_warning(msg, CloseDecisionWarning)
-
-
-def not_singular_error(model: SecondOrderModel, refusal: SingularPencilError) -> UncertainRankError | None:
-    """Make the refusal of a model that is regular by what rounding could have made alone; None if it is singular."""
-    exact = exact_order(model)
-    if exact is None or exact < 0:
-        return None
-    msg = (
-        f"det P(s) vanishes at every s to working precision, but the numbers as they are stored have {exact} finite "
-        f"eigenvalues: DOFs {listed(refusal.dofs)} are held by a part of M, C, K alone that rounding could have made. "
-        "Look for entries that nearly cancel: give those DOFs the mass, damper or spring that is meant, or take them "
-        "out."
-    )
-    return UncertainRankError(msg, dofs=refusal.dofs, gap=1.0)
