@@ -122,9 +122,9 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
     grown = abs(polynomial_at(stored.polynomial, point, stored.D.shape)[channel])
     value, found = exact.at(point)[channel], stored.exactly_at(point)[channel]
     true = abs(found - value) / max(abs(value), grown, sys.float_info.min)
-    if not loss.value / TOLD_SIZE <= true <= loss.value * TOLD_SIZE:
+    if not loss.there / TOLD_SIZE <= true <= loss.there * TOLD_SIZE:
         finding.complaints.append(
-            f"lost {loss.value:.1e} is told, {true:.1e} is right, at {loss.omega * tau:.1e} / tau"
+            f"lost {loss.there:.1e} is told, {true:.1e} is right, at {loss.omega * tau:.1e} / tau"
         )
     return finding
 

@@ -10,6 +10,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
+from halfdof_ctrl.reduction.algebra.integers import has_short_entries
 from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling, unit_free_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
@@ -200,8 +201,13 @@ def _loses_nothing(found: SingleSolve) -> bool:
 
 
 def _is_ordinary(found: SingleSolve) -> bool:
-    """Return whether M, C and K are those of an ordinary structure in odd units, which lets no more digits be lost."""
+    """Return whether M, C and K are those of an ordinary structure in odd units, which lets no more digits be lost.
+
+    Entries that were not rounded leave nothing open.
+    """
     if not found.leading.is_plainly_regular or found.coordinates.basis is not None:
+        return False
+    if all(has_short_entries(part) for part in found.model.quadratics.P):
         return False
     return all(has_even_entries(unit_free_scaling(part).of(part)) for part in found.model.quadratics.P if part.any())
 

@@ -17,6 +17,7 @@ from functools import partial
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import (
     EPS,
@@ -30,12 +31,11 @@ from halfdof_ctrl.base.arrays import (
 )
 from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
-from halfdof_ctrl.model.free_motions import free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
-from halfdof_ctrl.reduction.algebra.scaling import Scaling, log_scaling_with_time, max_scaling
-from halfdof_ctrl.reduction.method.loss_points import BESIDE_MODE, loss_points
-from halfdof_ctrl.reduction.method.masses import slowest_speed
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
+from halfdof_ctrl.reduction.method.long_answers import long_responses
+from halfdof_ctrl.reduction.method.loss_points import loss_points, points_of_few, signal_speeds, typical_speeds
 from halfdof_ctrl.reduction.method.refined_answers import (
     Equations,
     Response,
@@ -48,14 +48,16 @@ from halfdof_ctrl.reduction.method.refined_answers import (
 )
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
-TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
-ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
-SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
-DRIFT = 1e-12  #: part of a value that poles of free motions, which rounding has moved from the origin, may change
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-SHALLOW_AFTER = 1e-3  #: of a channel's largest value at lower frequencies: below, a loss is measured by that
+APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
+STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
+NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
+UNCLEAR = 1e-10  #: of a value, or ...
+UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
+LONG_ZERO = 1e-60  #: of what a channel could be: less is nothing in hundreds of bits
+UNDETERMINED = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
 SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
 EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels, up to which few states lose nothing
@@ -63,9 +65,10 @@ EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels
 
 @dataclass(frozen=True, slots=True)
 class Loss:
-    """How much of a channel's value is lost, where that is most."""
+    """How much of a channel is lost, where that is most."""
 
-    value: float = 0.0
+    value: float = 0.0  #: judged by what the channel is at this and at frequencies near it
+    there: float = 0.0  #: of its value at this frequency
     omega: float = float("nan")  #: [rad/s]
     output: str = ""  #: name of the output ...
     source: str = ""  #: ... and of the input
@@ -171,7 +174,7 @@ def measured(stored: Stored) -> Measurement:
     """Compare the stored system with the model at the frequencies that are looked at, for `loss_of` to judge."""
     comparison = _Comparison.of(stored)
     points = comparison.points
-    groups = [points] if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
+    groups = _neighbours(points) if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
     found = [part for group in groups for part in comparison.tried(group)]
     return Measurement(stored.model, comparison.chosen, found)
 
@@ -179,9 +182,9 @@ def measured(stored: Stored) -> Measurement:
 def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     """Return what is lost, where that is most.
 
-    Relative to a thousandth of what the channel is at some lower frequency, or to its part that grows with frequency
-    and is in no state space, where these are larger. What is at most `allowed` times what rounding of M, C and K at
-    random changes is none.
+    Relative to what the channel would be if it fell by s^3 from where it is largest, or to its part that grows with
+    frequency and is in no state space, where these are larger. What is at most `allowed` times what rounding of M, C
+    and K at random changes is none.
     """
     found = measurement.found
     if not found:
@@ -192,20 +195,40 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     missed, value, rounding, moved, grown = (
         np.concatenate([getattr(part, what.name) for _, part in found])[order] for what in fields(_Measured)
     )
+    own = np.maximum(value, grown)
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
-    size = np.maximum(np.maximum(value, grown), SHALLOW_AFTER * np.maximum.accumulate(value, axis=0))
-    relative = np.divide(missed, size, out=np.zeros(size.shape), where=value > 0.0)
+    size = np.maximum(np.maximum(value, grown), _slopes_from(np.abs(at), value))
+    relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
         return NOTHING_LOST
     worst = np.unravel_index(int(np.nan_to_num(relative, nan=np.inf).argmax()), relative.shape)
     k, i, j = (int(place) for place in worst)
+    lost, there = relative[k, i, j], missed[k, i, j] / own[k, i, j] if own[k, i, j] > 0.0 else np.inf
     return Loss(
-        float(np.nan_to_num(relative[k, i, j], nan=np.inf)),
+        float(np.nan_to_num(lost, nan=np.inf)),
+        float(np.nan_to_num(there, nan=np.inf)),
         float(abs(at[k])),
         measurement.model.outputs[i],
         measurement.model.inputs[int(measurement.chosen[j])],
     )
+
+
+def _neighbours(points: ComplexArray) -> list[ComplexArray]:
+    """Group points in rising order so that within a group unknowns are of a few sizes."""
+    at, groups = np.abs(points), []
+    while at.size:
+        near = int(np.searchsorted(at, NEIGHBOURS * at[0], side="right"))
+        groups.append(points[points.size - at.size :][:near])
+        at = at[near:]
+    return groups
+
+
+def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
+    """Return what channels would be at each point if they fell no more steeply than by s^3 from any other point."""
+    ratio = np.maximum(omega, omega[:, None]) / np.minimum(omega, omega[:, None])
+    shares = np.where(ratio >= APART, ratio**-STEEPEST, 0.0)
+    return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
 
 
 def _rounding_of_zeros(value: FloatArray) -> FloatArray:
@@ -230,15 +253,9 @@ class _Comparison:
     def of(cls, stored: Stored) -> "_Comparison":
         model, m, N = stored.model, stored.B.shape[1], len(stored.A)
         chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
-        points = loss_points(stored.A) if N else np.zeros(0, dtype=np.complex128)
-        speed = float(np.median(np.abs(points))) if N else 1.0
-        if len(model.dofs) <= FEW_DOFS:
-            speeds = _typical_speeds(model)
-            points = points[np.abs(points) > SLOWEST_SPEED * min(speeds)]
-            rest = _end_of_drift(model, stored.A)
-            typical = np.append(np.outer(speeds, TYPICAL_SPEEDS), slowest_speed(model) * BESIDE_MODE)
-            points = np.concatenate([points, 1j * np.unique(np.maximum(typical, rest))])
-            speed = speeds[-1]
+        few = len(model.dofs) <= FEW_DOFS
+        points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
+        speed = typical_speeds(model)[-1] if few else float(np.median(np.abs(points))) if N else 1.0
         rows, columns = scaling = max_scaling(sizes_at(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
         inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
@@ -257,6 +274,8 @@ class _Comparison:
             C=[output.X * scale, *[np.zeros_like(output.X) for _ in direct[1:]]],
             D=direct,
         )
+        if few:
+            points = points_of_few(model, stored.A, _speeds_of_signals(motion))
         return cls(stored=stored, points=points, scaling=scaling, motion=motion, states=states, chosen=chosen)
 
     @property
@@ -280,16 +299,43 @@ class _Comparison:
         u = np.tile(np.eye(self.chosen.size, dtype=np.complex128), points.size)
         said = refined_response(self.states, solver.balanced_solve, s, u)
         true = refined_response(self.motion, answer, s, u)
+        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], s, u)
+        settled = self._settled(points, said, true, grown)
         rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
         moved = self._undetermined(answer, s, true)
         small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
         rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
         shape = (len(value), points.size, self.chosen.size)
-        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], s, u)
         missed = np.abs(true.y - said.y)
-        missed = np.where(missed > UNSETTLED * (true.rounding + said.rounding), missed, 0.0)
+        looked_for = settled & (missed > UNSETTLED * (true.rounding + said.rounding)) & (moved <= UNDETERMINED * value)
+        missed = np.where(looked_for, missed, 0.0)
         parts = (missed, value, rounding, moved, grown)
         return _Measured(*[np.moveaxis(part.reshape(shape), 1, 0) for part in parts])
+
+    def _settled(
+        self, points: ComplexArray, said: Response, true: Response, grown: FloatArray
+    ) -> npt.NDArray[np.bool_]:
+        """Work in hundreds of bits, in place, what looks like a loss and what is not known well; say what is known."""
+        size, known = self._known(said, true, grown)
+        doubtful = ~known | (np.abs(true.y - said.y) > UNCLEAR * size)
+        shares = np.divide(np.abs(true.y - said.y), size, out=np.zeros(size.shape), where=doubtful & (size > 0.0))
+        worst = np.nan_to_num(shares, nan=np.inf).reshape(len(size), points.size, -1).max(axis=(0, 2), initial=0.0)
+        places = np.flatnonzero(doubtful.reshape(len(size), points.size, -1).any(axis=(0, 2)))
+        places = places[np.argsort(-worst[places], kind="stable")]
+        omegas = [float(points[k].imag) for k in places.tolist()]
+        for equations, response in ((self.states, said), (self.motion, true)):
+            for k, value in zip(places.tolist(), long_responses(equations, omegas), strict=True):
+                if value is not None:
+                    columns = slice(k * self.chosen.size, (k + 1) * self.chosen.size)
+                    nothing = LONG_ZERO * response.shown[:, columns]
+                    response.y[:, columns], response.rounding[:, columns] = value, EPS * np.abs(value) + nothing
+        return self._known(said, true, grown)[1]
+
+    def _known(self, said: Response, true: Response, grown: FloatArray) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+        """Return how large values are, and which are known well enough to be compared."""
+        size = np.maximum(np.maximum(np.abs(true.y), np.abs(said.y)), grown)
+        enough = np.maximum(UNCLEAR * size, UNCLEAR_CHANNEL * (true.shown + said.shown))
+        return size, np.asarray(UNSETTLED * (true.rounding + said.rounding) <= enough)
 
     def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         """Return the answer of all DOFs in the scaled units."""
@@ -304,30 +350,12 @@ class _Comparison:
         return np.asarray(np.max(changes, axis=0))
 
 
-def _end_of_drift(model: SecondOrderModel, A: FloatArray) -> float:
-    """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
-
-    A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2.
-    """
-    free = free_motion_count(model.M, model.C, model.K)
-    if free is None:
-        return 0.0
-    moved = np.sort(np.abs(np.linalg.eigvals(A)))[: free.poles]
-    twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
-    return float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=0.0))
-
-
-def _typical_speeds(model: SecondOrderModel) -> list[float]:
-    """Return the typical frequency of a model of few DOFs, and that of its springs and dampers, where that is another.
-
-    A single mass that is tiny makes the first one very large, though what moves without it is as slow as before.
-    """
-    K, C, M = (model.as_dense() if model.is_sparse else model).quadratics.P
-    logs = [log_scaling_with_time(np.stack([K, C, M]))[2]]
-    if K.any() and C.any():
-        slow = log_scaling_with_time(np.stack([K, C]))[2]
-        logs += [slow] if abs(slow - logs[0]) > ANOTHER_SCALE else []
-    return [float(np.exp2(log)) for log in logs]
+def _speeds_of_signals(motion: Equations) -> list[float]:
+    """Return the frequencies at which an input, an output or what passes directly changes its kind."""
+    into = [np.abs(part).max(axis=0, initial=0.0) for part in motion.B]
+    out = [np.abs(as_dense(part)).max(axis=1, initial=0.0) for part in motion.C]
+    direct = [np.abs(part).ravel() for part in motion.D]
+    return [speed for signals in (into, out, direct) for speed in signal_speeds(signals)]
 
 
 def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:

@@ -1,4 +1,14 @@
-"""The points on the imaginary axis at which a loss of digits shows: beside the slowest modes of a state space."""
+"""The points on the imaginary axis at which a loss of digits shows.
+
+They lie beside the slowest modes of a state space. In a model of few DOFs, where a point costs next to nothing, also at
+its typical frequencies, where an output or an input turns from displacements to velocities or accelerations, towards
+rest, and in every decade between the slowest and the fastest of them: a mass that is tiny makes a pole that says
+nothing of where the model is looked at.
+"""
+
+import sys
+from collections.abc import Sequence
+from itertools import combinations, pairwise
 
 import numpy as np
 import scipy.linalg
@@ -7,6 +17,10 @@ from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
+from halfdof_ctrl.model.free_motions import free_motion_count
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
+from halfdof_ctrl.reduction.method.masses import slowest_speed
 
 ALL_EIGENVALUES = 60  #: up to which all eigenvalues are computed to choose the frequencies
 SLOW_MODES = 6  #: of more states, that are looked for
@@ -14,6 +28,16 @@ SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
 MOST_FREQUENCIES = 4  #: frequencies that are chosen
 BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
+TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
+ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
+SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
+TOWARDS_REST = 0.1  #: of the slowest frequency of a model of few DOFs without free motions
+DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
+SAME_SPEED = 4.0  #: ratio of two frequencies of signals of which one is enough
+MOST_OF_SIGNALS = 8  #: frequencies of signals that are looked at, spread over all
+DECADE = 10.0  #: ratio of neighbouring frequencies at most, as far as ...
+MOST_BETWEEN = 24  #: ... so many more allow
+FEW_BITS = 10  #: bits of a frequency, so that exact arithmetic has short numbers
 BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are looked for if A is singular
 
 
@@ -53,3 +77,87 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     return poles, np.full(
         poles.size, (AT_ORIGIN if shift == 0.0 else SLOW_MODES_ACCURACY) * np.abs(poles).max(initial=0.0)
     )
+
+
+def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> ComplexArray:
+    """Choose points for a model of few DOFs.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    A : (N, N) ndarray
+    signals : sequence of float
+        `signal_speeds`.
+    """
+    speeds, slow = typical_speeds(model), np.abs(loss_points(A)) if len(A) else np.zeros(0)
+    own = np.concatenate([slow[slow > SLOWEST_SPEED * min(speeds)], np.outer(speeds, TYPICAL_SPEEDS).ravel()])
+    least = _end_of_drift(model, A)
+    chosen = np.unique(np.concatenate([own, [slowest_speed(model) * BESIDE_MODE], _apart(np.asarray(signals))]))
+    chosen = chosen[chosen >= min(least, chosen[-1])]
+    wide = np.concatenate([[TOWARDS_REST * chosen[0] if least == 0.0 else chosen[0]], chosen])
+    step = max(DECADE, float(wide[-1] / wide[0]) ** (1.0 / MOST_BETWEEN))
+    between = [
+        low * (high / low) ** (np.arange(1, count) / count)
+        for low, high in pairwise(wide)
+        if (count := int(np.ceil(np.log(high / low) / np.log(step)))) > 1
+    ]
+    mantissa, exponent = np.frexp(np.concatenate([wide, *between]))
+    return np.asarray(1j * np.unique(np.ldexp(np.rint(np.ldexp(mantissa, FEW_BITS)), exponent - FEW_BITS)))
+
+
+def typical_speeds(model: SecondOrderModel) -> list[float]:
+    """Return the typical frequency of a model of few DOFs, and that of its springs and dampers, where that is another.
+
+    A single mass that is tiny makes the first one very large, though what moves without it is as slow as before.
+    """
+    K, C, M = (model.as_dense() if model.is_sparse else model).quadratics.P
+    logs = [log_scaling_with_time(np.stack([K, C, M]))[2]]
+    if K.any() and C.any():
+        slow = log_scaling_with_time(np.stack([K, C]))[2]
+        logs += [slow] if abs(slow - logs[0]) > ANOTHER_SCALE else []
+    return [float(np.exp2(log)) for log in logs]
+
+
+def signal_speeds(coefficients: Sequence[FloatArray]) -> list[float]:
+    """Return the frequencies at which parts ``X_j s^j`` and ``X_k s^k`` of some signals are of one size.
+
+    Parameters
+    ----------
+    coefficients : sequence of (k,) ndarrays
+        How large each part of each of k signals is.
+
+    Examples
+    --------
+    A displacement and an acceleration that is weighted with 1e-4 s^2:
+
+    >>> signal_speeds([np.array([1.0]), np.array([0.0]), np.array([1e-4])])
+    [100.0]
+    """
+    found: list[float] = []
+    for (j, low), (k, high) in combinations(enumerate(coefficients), 2):
+        both = (low > 0.0) & (high > 0.0)
+        found += ((low[both] / high[both]) ** (1.0 / (k - j))).tolist()
+    return found
+
+
+def _apart(speeds: FloatArray) -> FloatArray:
+    """Return some frequencies that differ."""
+    logs = np.unique(np.rint(np.log(speeds) / np.log(SAME_SPEED)))
+    places = np.unique(np.linspace(0, logs.size - 1, min(logs.size, MOST_OF_SIGNALS)).astype(np.intp))
+    return np.asarray(SAME_SPEED ** logs[places])
+
+
+def _end_of_drift(model: SecondOrderModel, A: FloatArray) -> float:
+    """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
+
+    A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2. That
+    is no excuse where other poles are.
+    """
+    free = free_motion_count(model.M, model.C, model.K)
+    if free is None:
+        return 0.0
+    sizes = np.sort(np.abs(np.linalg.eigvals(A)))
+    moved, others = sizes[: free.poles], sizes[free.poles :]
+    twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
+    end = float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=sys.float_info.min))
+    return min(end, TYPICAL_SPEEDS[0] * float(others.min(initial=np.inf)))

@@ -19,6 +19,10 @@ Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
 MOST_ANSWER_CORRECTIONS = 4  #: of a solution
 CORRECTED = 1e-22  #: of what is seen: a smaller correction is the last one
+STUCK_SHARE = 0.3  #: of a correction, that the next one must be below, ...
+STUCK_ABOVE = 1e-24  #: ... as long as it is more than that of the unknowns: else the factors are too poor
+CERTAIN_DIGITS = 1e-4  #: of a solution: where its first correction is smaller, the rounding of residuals is nothing
+NOISE_DEVIATION = 10.0  #: times what rounding of residuals at random does in an output, which may be more
 SETTLED_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
 
 
@@ -74,22 +78,41 @@ def refined_response(equations: Equations, solve: Solver, s: ComplexArray, u: Co
     def together(x: ComplexArray, u: ComplexArray) -> ComplexArray:
         return np.concatenate([units[:, None] * x, u])
 
+    def largest(part: ComplexArray) -> FloatArray:
+        return np.asarray(np.abs(units[:, None] * part).max(axis=0, initial=0.0))
+
     rest = equation.residual(s, together(x, u))
     low = step = solve(rest)
-    size = CORRECTED * np.abs(equations.seen(s, x))
+    enough, every, after = CORRECTED * np.abs(equations.seen(s, x)), largest(x), largest(step)
+    alike = every / units[:, None]
+    noise = np.zeros_like(enough)
+    if not (after <= CERTAIN_DIGITS * every).all():
+        noise = _noise_of_residuals(equations, solve, s, alike, u)
+    stuck = np.zeros(s.size, dtype=np.bool_)
     for _ in range(MOST_ANSWER_CORRECTIONS - 1):
-        if (np.abs(equations.seen(s, step)) <= size).all():
+        if (np.abs(equations.seen(s, step)) <= enough).all():
             break
+        before = after
         rest = equation.residual(s, together(step, np.zeros_like(u)), rest)
         step = solve(rest)
-        low = low + step
-    largest = np.abs(units[:, None] * x).max(axis=0, initial=0.0) / units[:, None]
-    rounding = (
-        np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low) + SETTLED_DIGIT * equations.sizes(s, largest)
+        low, after = low + step, largest(step)
+        stuck = (after > STUCK_SHARE * before) & (after > STUCK_ABOVE * every)
+    rounding = noise + np.abs(equations.seen(s, step)) + EPS * equations.sizes(s, low)
+    return Response(
+        x=x,
+        y=np.asarray(equations.seen(s, low) - output.residual(s, together(x, u))),
+        rounding=np.where(stuck, np.inf, rounding + SETTLED_DIGIT * equations.sizes(s, alike)),
+        shown=equations.sizes(s, np.broadcast_to(np.abs(x).max(axis=0, initial=0.0), x.shape)),
     )
-    y = equations.seen(s, low) - output.residual(s, together(x, u))
-    every = np.broadcast_to(np.abs(x).max(axis=0, initial=0.0), x.shape)
-    return Response(x=x, y=np.asarray(y), rounding=np.asarray(rounding), shown=equations.sizes(s, every))
+
+
+def _noise_of_residuals(
+    equations: Equations, solve: Solver, s: ComplexArray, x: FloatArray, u: ComplexArray
+) -> FloatArray:
+    """Return what the rounding of residuals, in unknowns of some sizes, may do in the outputs: tried at random."""
+    terms = SETTLED_DIGIT * (sizes_of_terms(equations.R, s, x) + sizes_of_terms(equations.B, s, u))
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], terms.shape)
+    return NOISE_DEVIATION * np.abs(equations.seen(s, solve((signs * terms).astype(np.complex128))))
 
 
 def sizes_of_terms(coefficients: Sequence[Matrix], s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:
