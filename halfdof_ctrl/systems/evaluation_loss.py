@@ -13,16 +13,18 @@ import control
 import numpy as np
 from scipy.linalg.lapack import dgebal
 
-from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.spectrum import balanced
-from halfdof_ctrl.reduction.method.loss_points import loss_points
+from halfdof_ctrl.reduction.method.loss_points import BESIDE_MODE, loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
-UNEVEN = 5e7  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
+UNEVEN = 1e5  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
 EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
+FASTER_POINTS = 6  #: frequencies besides the slowest ones, over all others: what is lost may show at any mode
+BELOW_ALL = 0.1  #: times the slowest of these, where responses begin to be looked at
 BESIDE_ORIGIN = 1.01  #: times the largest pole that stands for one at the origin: frequencies up to there are not tried
 SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
 EVALUATION_LOSS_ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
@@ -79,11 +81,7 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     A = np.asarray(sys.A, dtype=float)
     if len(A) > EVALUATION_LOSS_MOST_STATES or not _is_uneven(A):
         return None
-    points = loss_points(A)
-    if at_origin:
-        slowest = np.sort(np.abs(np.linalg.eigvals(balanced(A))))
-        points = points[np.abs(points) > BESIDE_ORIGIN * slowest[min(at_origin, len(A)) - 1]]
-    points = points[:1] if len(A) > EVALUATION_LOSS_MANY_STATES else points
+    points = _points(A, at_origin)
     if points.size == 0:
         return None
     right = system_response(sys, points)
@@ -99,6 +97,23 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
         return None
     i, j, k = (int(place) for place in np.unravel_index(int(shares.argmax()), shares.shape))
     return EvaluationLoss(float(shares[i, j, k]), float(abs(points[k])), i, j)
+
+
+def _points(A: FloatArray, at_origin: int) -> ComplexArray:
+    """Choose frequencies: beside the slowest modes and a decade below, and over the faster ones."""
+    points = loss_points(A)
+    if len(A) > EVALUATION_LOSS_MANY_STATES and not at_origin:
+        return points[:1]
+    size = np.sort(np.abs(np.linalg.eigvals(balanced(A))))
+    still = BESIDE_ORIGIN * size[min(at_origin, len(A)) - 1] if at_origin else 0.0
+    points = points[np.abs(points) > still]
+    if len(A) > EVALUATION_LOSS_MANY_STATES or points.size == 0:
+        return points[:1]
+    slowest = float(np.abs(points).min())
+    faster = size[size > slowest]
+    spread = faster[np.unique(np.linspace(0, faster.size - 1, FASTER_POINTS).astype(np.intp))] if faster.size else faster
+    below = max(BELOW_ALL * slowest, still)
+    return np.concatenate([points, 1j * BESIDE_MODE * np.append(spread, below)])
 
 
 def _is_uneven(A: FloatArray) -> bool:
