@@ -35,7 +35,7 @@ from halfdof_ctrl.design.starts import Solver
 from halfdof_ctrl.model.dense_copy import is_large
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.state_space import labelled_system, system_of_model
 
@@ -195,6 +195,8 @@ def lqr(
     -----
     InaccurateGainWarning
         The estimated error of the gain (`StateFeedback.gain_error`) is above 1e-8.
+    LostDigitsWarning
+        `StateFeedback.closed_loop`, as double precision stores it, loses more than 1e-9 of an output.
 
     Examples
     --------
@@ -211,7 +213,8 @@ def lqr(
     model = checked_model(model, "lqr")
     if model.is_sparse and not is_large(model):
         model = model.as_dense()
-    reduction = exact_reduction(model)
+    reduction = reduced(model)
+    reduction.solution.evidence.warn_of_loss("A, B, C and D of the closed loop in displacements and velocities")
     if reduction.order > MOST_STATES:
         msg = (
             f"lqr works on models with up to {MOST_STATES} states; this one has {reduction.order}. Regulate its slow "

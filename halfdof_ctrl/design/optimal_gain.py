@@ -21,7 +21,7 @@ from halfdof_ctrl.design.plant import Plant, plant_in_energy_states, plant_of
 from halfdof_ctrl.design.reach import axis_eigenvalues, hidden_mode
 from halfdof_ctrl.design.riccati import FEW, MORE, solved_care
 from halfdof_ctrl.design.starts import Solver
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 
@@ -195,7 +195,7 @@ def _best_force(reduction: ExactReduction, mode: ComplexArray) -> str:
     dofs = reduction.model.dofs
     if reduction.model.is_sparse:  # of a large model those that have states
         dofs = tuple([state for state in reduction.states if state in set(dofs)]) or dofs[:1]
-    every_force = exact_reduction(reduction.model.select(inputs=force_names(dofs)))
+    every_force = reduced(reduction.model.select(inputs=force_names(dofs)))
     return dofs[int(np.argmax(np.abs(mode @ every_force.B)))]
 
 

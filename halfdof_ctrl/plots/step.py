@@ -24,7 +24,7 @@ from halfdof_ctrl.plots.axes import (
     require_system,
 )
 from halfdof_ctrl.plots.units import Units, known_units, plain, signal_label, signal_names, typeset
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.frequency import DISCRETE_ORIGIN
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
@@ -95,7 +95,7 @@ def step_plot(
     known = known_units(sysdata, units)
     reduction: ExactReduction | None = None
     if isinstance(sysdata, SecondOrderModel):
-        reduction, discrete = exact_reduction(sysdata), False
+        reduction, discrete = reduced(sysdata), False
         response = step_response(sysdata, timepts)
         if sysdata.is_sparse and len(sysdata.dofs) > MOST_RECOVERED:
             reduction = None  # nobody could tell so many curves apart

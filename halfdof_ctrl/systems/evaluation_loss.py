@@ -16,7 +16,7 @@ from scipy.linalg.lapack import dgebal
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.spectrum import balanced
-from halfdof_ctrl.reduction.method.loss_points import BESIDE_MODE, loss_points
+from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE, loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
@@ -24,7 +24,6 @@ UNEVEN = 1e5  #: change of A by balancing, in its norm times the range of the fa
 EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
 FASTER_POINTS = 6  #: frequencies besides the slowest ones, over all others: what is lost may show at any mode
-BELOW_ALL = 0.1  #: times the slowest of these, where responses begin to be looked at
 BESIDE_ORIGIN = 1.01  #: times the largest pole that stands for one at the origin: frequencies up to there are not tried
 SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
 EVALUATION_LOSS_ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
@@ -111,7 +110,9 @@ def _points(A: FloatArray, at_origin: int) -> ComplexArray:
         return points[:1]
     slowest = float(np.abs(points).min())
     faster = size[size > slowest]
-    spread = faster[np.unique(np.linspace(0, faster.size - 1, FASTER_POINTS).astype(np.intp))] if faster.size else faster
+    spread = (
+        faster[np.unique(np.linspace(0, faster.size - 1, FASTER_POINTS).astype(np.intp))] if faster.size else faster
+    )
     below = max(BELOW_ALL * slowest, still)
     return np.concatenate([points, 1j * BESIDE_MODE * np.append(spread, below)])
 

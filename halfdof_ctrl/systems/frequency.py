@@ -25,7 +25,7 @@ from halfdof_ctrl.descriptor.sparse_response import sparse_frequency_response
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.kinds import null_column_kinds
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.modal.modes import Modes, ShiftedStiffness, is_unsymmetric, lowest_modes
 from halfdof_ctrl.systems.channel_zeros import descriptor_zeros, system_zeros
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies, visible_zeros
@@ -162,7 +162,7 @@ def frequency_response(
         if has_many_states(sysdata):
             return descriptor_response(sysdata, omega)
         try:
-            reduction = exact_reduction(sysdata)
+            reduction = reduced(sysdata)
             sys, model = system_of_model(reduction), sysdata
         except NoStateSpaceError:
             return descriptor_response(sysdata, omega)
@@ -206,7 +206,7 @@ def model_frequencies(model: SecondOrderModel) -> FloatArray:
         return _grid(*descriptor_modes(model))
     if not has_many_states(model):
         try:
-            reduction = exact_reduction(model)
+            reduction = reduced(model)
             return _grid(*system_modes(system_of_model(reduction, improper="drop"), reduction.polynomial_part, model))
         except NoStateSpaceError:
             pass

@@ -18,7 +18,7 @@ from halfdof_ctrl.base.errors import EnergyFormError, InconsistentStateError, Ma
 from halfdof_ctrl.base.names import motion_names
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form, motion_output
 from halfdof_ctrl.reduction.energy.modal import modal_form
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -190,8 +190,10 @@ def state_map(model: SecondOrderModel | ExactReduction, states: States = "energy
     (('strain_y', 'momentum_y'), [3.0, 0.0], 4.5)
     """
     require_kind(states)
-    reduction = model if isinstance(model, ExactReduction) else exact_reduction(checked_model(model, "state_map"))
+    reduction = model if isinstance(model, ExactReduction) else reduced(checked_model(model, "state_map"))
     if states in ("dofs", "scaled"):
+        if reduction is not model:
+            reduction.solution.evidence.warn_of_loss()
         return _map_of_dofs(reduction, states)
     form = energy_form(reduction.model)
     return map_of_form(modal_form(form) if states == "modal" else form, states, reduction)

@@ -25,16 +25,17 @@ from halfdof_ctrl.base.sparse_arrays import MatrixLike
 from halfdof_ctrl.model.doors import require_matrix
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import exact_reduction, reduced
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form
 from halfdof_ctrl.reduction.energy.modal import modal_form
 from halfdof_ctrl.reduction.energy.rigid import NEARLY_FREE
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.signals import Signal
-from halfdof_ctrl.systems.handover import warn_of_python_control
+from halfdof_ctrl.systems.handover import warn_of_python_control, warn_of_stored
 from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, require_same_order, scaled_units
 
 REDUCIBLE = (SecondOrderModel, ExactReduction)  #: what brings its matrices and names with it
+DOF_STATES = ("dofs", "scaled")  #: kinds of states that are displacements and velocities, but for powers of two
 NOT_GIVEN = frozenset({type(None)})  #: the type of what is not given
 
 Improper: TypeAlias = Literal["refuse", "drop"]
@@ -109,9 +110,10 @@ def mech2ss(
     CloseDecisionWarning
         In energy or modal states, K nearly leaves a motion free.
     LostDigitsWarning
-        Poles at the origin, of motions that K and C leave free, are moved by rounding; or python-control's evaluation
-        of this system (``sys(s)``, `control.bode_plot`) will lose more than 1e-6, since it does not balance states of
-        different sizes. Measured beside the slowest modes, for up to 1000 states.
+        A, B, C and D in the states that are asked for lose more than 1e-9 of an output; poles at the origin, of motions
+        that K and C leave free, are moved by rounding; or python-control's evaluation of this system (``sys(s)``,
+        `control.bode_plot`) will lose more than 1e-6, since it does not balance states of different sizes. Measured
+        beside modes and below them, for up to 1000 states.
 
     Examples
     --------
@@ -130,23 +132,27 @@ def mech2ss(
     else:
         require_matrix(model, "mech2ss", parameter="model")
         model = mechss(model, C, K, B, F, G, H=H, D=D, dofs=dofs, inputs=inputs, outputs=outputs, name=name)
-    reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
-    system = system_of_model(reduction, improper=improper, states=states)
-    if not (states == "dofs" and reduction.solution.is_even):
-        warn_of_python_control(reduction.model, system, states)
+    in_dofs = states in DOF_STATES
+    if not isinstance(model, ExactReduction):
+        model = exact_reduction(model) if in_dofs else reduced(model)
+    system = system_of_model(model, improper=improper, states=states)
+    if not in_dofs:
+        warn_of_stored(model, system)
+    if not (states == "dofs" and model.solution.is_even):
+        warn_of_python_control(model.model, system, states)
     return system
 
 
 def system_of_model(
     model: SecondOrderModel | ExactReduction, *, improper: Improper = "refuse", states: States = "dofs"
 ) -> control.StateSpace:
-    """Make the state space of a model as `mech2ss` does, for use inside: whoever evaluates it balances it."""
-    reduction = model if isinstance(model, ExactReduction) else exact_reduction(model)
+    """Make the state space of a model as `mech2ss` does, for use inside: nobody is told what may be lost with it."""
+    reduction = model if isinstance(model, ExactReduction) else reduced(model)
     output = reduction.output
     if len(output.U) > 1 and improper == "refuse":
         raise _improper_error(reduction.model, output)
     model = reduction.model
-    if states in ("energy", "modal"):
+    if states not in DOF_STATES:
         return _in_energy_states(reduction, states)
     size, names = (None, reduction.states) if states == "dofs" else scaled_units(reduction)
     return labelled_system(

@@ -20,7 +20,7 @@ from halfdof_ctrl.base.errors import HalfdofError, ParameterError
 from halfdof_ctrl.base.names import control_label, control_labels
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
 from halfdof_ctrl.systems.origin import poles_of_model
@@ -210,9 +210,11 @@ class _Plant:
 
     @classmethod
     def of(cls, model: SecondOrderModel) -> "_Plant":
-        reduction = exact_reduction(checked_model(model, "A time response"))
+        reduction = reduced(checked_model(model, "A time response"))
         sys = system_of_model(reduction)  # refuses what has no state space
         states = working_map(reduction)
+        if states is None or states.kind != "energy":
+            reduction.solution.evidence.warn_of_loss()
         return cls(model, reduction, states, sys if states is None else system_of_map(states))
 
     def times(self, timepts: npt.ArrayLike | None, start: FloatArray | None = None) -> FloatArray:

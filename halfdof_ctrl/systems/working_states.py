@@ -18,7 +18,7 @@ from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import refined
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.choose import exact_reduction
+from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.systems.hessenberg import bounded_response, state_space_response
@@ -64,8 +64,10 @@ def working_form(model: SecondOrderModel, order: int) -> EnergyForm | None:
 
 def working_matrix(model: SecondOrderModel) -> FloatArray:
     """Return A in energy coordinates where the model has them, else in DOF states."""
-    reduction = exact_reduction(model)
+    reduction = reduced(model)
     form = working_form(model, reduction.order)
+    if form is None:
+        reduction.solution.evidence.warn_of_loss()
     return reduction.A if form is None else form.A
 
 
@@ -99,8 +101,11 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         The model has no state space (see `mech2ss`).
     """
-    sys = system_of_model(model)
+    reduction = reduced(model)
+    sys = system_of_model(reduction)
     form = working_form(model, sys.nstates)
+    if form is None:
+        reduction.solution.evidence.warn_of_loss()
     return sys if form is None else energy_state_space(form)
 
 
@@ -129,7 +134,13 @@ def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: C
     if not model.is_sparse and _is_sound(model, values, points):
         return values
     form = working_form(model, reduction.order)
-    return values if form is None else response_of_form(form, values, points)
+    if form is not None:
+        return response_of_form(form, values, points)
+    if not model.is_sparse and points.size * len(model.dofs) ** 3 <= SOLVING_EFFORT:
+        exact = refined_response(model, points)
+        return np.where(np.isfinite(exact), exact, values)
+    reduction.solution.evidence.warn_of_loss()
+    return values
 
 
 def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArray) -> ComplexArray:

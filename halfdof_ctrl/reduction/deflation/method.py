@@ -26,7 +26,6 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
 from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, UNROUNDED_BITS
-from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
@@ -41,7 +40,7 @@ from halfdof_ctrl.reduction.method.loss import Loss, measured_loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_solver, sizes_at
+from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_answer
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
@@ -95,10 +94,7 @@ class Deflation(FromEquations):
 
     def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         """Return the response of all DOFs to forces."""
-        P = self.model.quadratics.P
-        scaling = max_scaling(sizes_at(P, float(np.abs(states.points).max())), even=2.0)
-        solve = pencil_solver([scaling.of(part) for part in P], states.points)
-        return np.asarray(scaling.columns[:, None] * solve(scaling.rows[:, None] * force))
+        return pencil_answer(self.model, states.points, force)
 
     def inverse_rows(self) -> FloatArray:
         """Refuse: W is singular.

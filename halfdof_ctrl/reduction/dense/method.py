@@ -21,6 +21,7 @@ from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evid
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import (
     NOTHING_LOST,
+    TEN_TIMES_DATA,
     Loss,
     is_well_conditioned,
     loses_nothing,
@@ -36,7 +37,6 @@ from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signa
 
 SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
-TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less

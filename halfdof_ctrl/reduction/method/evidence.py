@@ -93,11 +93,11 @@ class Evidence:
         return any(decision.is_doubtful for decision in self.decisions)
 
     def warn(self, tol: float | None) -> None:
-        """Warn of everything that a user must know.
+        """Warn of what a user must know whatever states he gets.
 
         Warns
         -----
-        CloseDecisionWarning, LostDigitsWarning, NearlyMasslessWarning
+        CloseDecisionWarning, NearlyMasslessWarning
         """
         if self.light is not None:
             _warn_of_light_masses(self.light)
@@ -109,7 +109,25 @@ class Evidence:
             _warn_of_hardly_regular(self.rcond)
         if self.barely:
             _warn_of_barely_regular()
-        _warn_of_lost_digits(self.loss, self.rcond)
+
+    def warn_of_loss(self, what: str = "A, B, C and D") -> None:
+        """Warn whoever uses these states where what is stored loses more than 1e-9 of a channel.
+
+        Parameters
+        ----------
+        what : str, optional
+            The numbers that are told of.
+
+        Warns
+        -----
+        LostDigitsWarning
+        """
+        if not self.altered:
+            cause = "some states are far faster than others, as DOFs with hardly any mass or damping make them"
+            if self.rcond < CALLED_ILL_CONDITIONED:
+                number = f"reciprocal condition number {self.rcond:.1e}"
+                cause = f"the equations for the highest derivatives are ill conditioned ({number})"
+            warn_of_lost_digits(self.loss, cause, what)
 
 
 def _warn_of_another_model(tol: float | None) -> None:
@@ -138,16 +156,16 @@ def _warn_of_barely_regular() -> None:
     give_warning(msg, CloseDecisionWarning)
 
 
-def _warn_of_lost_digits(loss: Loss, rcond: float) -> None:
-    """Warn where what is stored loses more than 1e-9 of a channel."""
+def warn_of_lost_digits(loss: Loss, cause: str, what: str = "A, B, C and D") -> None:
+    """Warn where what is stored loses more than 1e-9 of a channel.
+
+    Warns
+    -----
+    LostDigitsWarning
+    """
     if loss.value > ALLOWED_LOSS:
-        cause = (
-            f"the equations for the highest derivatives are ill conditioned (reciprocal condition number {rcond:.1e})"
-            if rcond < CALLED_ILL_CONDITIONED
-            else "some states are far faster than others, as DOFs with hardly any mass or damping make them"
-        )
         msg = (
-            f"The state space is exact, but A, B, C and D as double precision stores them lose {loss.there:.1e} of "
+            f"The state space is exact, but {what} as double precision stores them lose {loss.there:.1e} of "
             f"{loss.output} from {loss.source} at {loss.omega:.3g} rad/s: terms cancel in them that are "
             f"{loss.there / EPS:.0e} times as large as what they leave, since {cause}. "
             "descriptor_response keeps the digits."

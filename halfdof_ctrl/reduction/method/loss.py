@@ -52,6 +52,7 @@ MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
 STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
+TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 UNCLEAR = 1e-10  #: of a value, or ...

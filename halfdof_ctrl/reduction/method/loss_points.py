@@ -27,6 +27,7 @@ SLOW_MODES = 6  #: of more states, that are looked for
 SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
 MOST_FREQUENCIES = 4  #: frequencies that are chosen
 BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
+BELOW_ALL = 0.1  #: times the slowest of them, where responses begin to be looked at
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at

@@ -14,6 +14,8 @@ from scipy.sparse import csc_array, diags_array, hstack
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, as_dense, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 
 Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
@@ -195,6 +197,18 @@ def pencil_solver(P: Sequence[Matrix], points: ComplexArray) -> Solver:
         return np.hstack([zgetrs(*each, part)[0] for each, part in zip(factors, parts, strict=True)])
 
     return solve
+
+
+def pencil_answer(model: SecondOrderModel, points: ComplexArray, force: ComplexArray) -> ComplexArray:
+    """Return the response of all DOFs to forces, (n, k), to a digit or two, by factors of P(s) in even units."""
+    P = model.quadratics.P
+    scaling = max_scaling(sizes_at(P, float(np.abs(points).max())), even=2.0)
+    solve = pencil_solver([_scaled(part, scaling) for part in P], points)
+    return np.asarray(scaling.columns[:, None] * solve(scaling.rows[:, None] * force))
+
+
+def _scaled(matrix: Matrix, scaling: Scaling) -> Matrix:
+    return scaling.of(matrix) if isinstance(matrix, np.ndarray) else scaling.of_sparse(matrix)
 
 
 def factorized(matrix: ComplexArray) -> tuple[Any, ...]:
