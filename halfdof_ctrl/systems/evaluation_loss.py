@@ -95,7 +95,9 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     if not shares.size:
         return None
     i, j, k = (int(place) for place in np.unravel_index(int(shares.argmax()), shares.shape))
-    return EvaluationLoss(float(shares[i, j, k]), float(abs(points[k])), i, j)
+    value = float(shares[i, j, k])
+    relative = value if value <= WARNED else float(errors[i, j, k] / size[i, j, k])  # that is what a user finds there
+    return EvaluationLoss(relative, float(abs(points[k])), i, j)
 
 
 def _points(A: FloatArray, at_origin: int) -> ComplexArray:

@@ -6,14 +6,14 @@ import control
 import numpy as np
 from scipy.linalg.lapack import dgetrf
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, has_even_entries, is_zero
+from halfdof_ctrl.base.arrays import EPS, FloatArray, has_even_entries, is_zero
 from halfdof_ctrl.base.spectrum import balanced
 from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.evidence import warn_of_lost_digits
 from halfdof_ctrl.reduction.method.loss import TEN_TIMES_DATA, is_well_conditioned, loss_of, measured
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_answer
+from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver, scaled_pencil_solver
 from halfdof_ctrl.reduction.method.signals import Signal, trimmed
 from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
 from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
@@ -37,9 +37,9 @@ class _HandedOver:
         """Return the outputs of the model."""
         return self.signal
 
-    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the response of all DOFs to forces."""
-        return pencil_answer(self.model, states.points, force)
+    def answers(self, states: StateSolver) -> Solver:
+        """Return what gives the response of all DOFs to forces."""
+        return scaled_pencil_solver(self.model, states.points)
 
 
 def warn_of_stored(reduction: ExactReduction, sys: control.StateSpace) -> None:

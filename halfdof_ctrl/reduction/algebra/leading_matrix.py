@@ -1,6 +1,6 @@
 """The leading matrix W of equation (2), factorized once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ PLAINLY_REGULAR = 1e-5  #: W with this reciprocal condition number is not scaled
 PLAINLY_REGULAR_IF_SMALL = 1e-3  #: ... and W of few DOFs with this one
 FEW_DOFS = 60  #: DOFs that are few
 FEWEST_DOFS = 8  #: DOFs that are so few that a factorization takes less than a microsecond
+SURELY_REGULAR = 1e-8  #: W with a smaller one is checked by equation (19): many DOFs are scaled for the best below it
 MOST_SCALING_STEPS = 16  #: of the iteration for the best scaling
 LEAST_FACTOR = 2.0**-200  #: of a row, in that iteration, over the largest one
 SCALING_GAIN = 0.95  #: a step of it must bring the condition number below this part of what it was
@@ -45,30 +46,36 @@ class LeadingMatrix:
         A W that is well conditioned as it stands, or with its rows and columns brought to one size, is so in the
         best units too. Otherwise it is scaled by the means
         of the logarithms of its entries, which gives the same matrix whatever the units were, and by the best
-        scaling after that if its condition still asks for it. So `rcond` is the same in any units up to what powers
+        scaling after that if its condition still asks for it; of many DOFs, that takes as long as several solves, and
+        only a W that might be called singular asks for it. So `rcond` is the same in any units up to what powers
         of two and the estimate leave, a factor of about four, or large enough in all of them.
         """
         enough = plainly_regular(len(W))
+        leading = None
         if len(W) <= FEW_DOFS or not _is_uneven(W, enough):
             factors, pivots, rcond = lu_and_rcond(W)
+            kept = None if len(W) > FEWEST_DOFS and rcond >= enough else W
+            leading = cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=kept, rcond=rcond)
             if rcond >= enough:
-                kept = W if len(W) <= FEWEST_DOFS else None
-                return cls(factors=factors, pivots=pivots, rows=None, columns=None, scaled=kept, rcond=rcond)
-        if len(W) > FEW_DOFS:
-            leading = cls._scaled(W, max_scaling(W))
-            if leading.rcond >= enough:
                 return leading
-        leading = cls._scaled(W, log_scaling(W, powers_of_two=True))
+        if len(W) > FEW_DOFS:
+            leading = cls._scaled(W, max_scaling(W), leading)
+            if leading.rcond >= SURELY_REGULAR:
+                return leading
+        leading = cls._scaled(W, log_scaling(W, powers_of_two=True), leading)
         if leading.rcond == 0.0 or leading.rcond >= enough:
             return leading
         better = cls._scaled(W, leading.best_scaling())
         return better if better.rcond > leading.rcond else leading
 
     @classmethod
-    def _scaled(cls, W: FloatArray, scaling: Scaling) -> "LeadingMatrix":
+    def _scaled(cls, W: FloatArray, scaling: Scaling, known: "LeadingMatrix | None" = None) -> "LeadingMatrix":
+        """Scale and factorize, but for what is only a multiple of what is known."""
+        rows, columns = scaling
+        if known is not None and _is_a_multiple(known, scaling):
+            return known if known.rows is not None else replace(known, rows=np.ones(len(W)), columns=np.ones(len(W)))
         scaled = scaling.of(W)
         factors, pivots, rcond = lu_and_rcond(scaled)
-        rows, columns = scaling
         return cls(factors=factors, pivots=pivots, rows=rows, columns=columns, scaled=scaled, rcond=rcond)
 
     def best_scaling(self) -> Scaling:
@@ -130,7 +137,7 @@ class LeadingMatrix:
             return np.asarray(dgesv(self.scaled, right)[2])
         right = right * self.rows[:, None]
         solution = dgetrs(self.factors, self.pivots, right)[0]
-        if self.rcond < PLAINLY_REGULAR_IF_SMALL:
+        if not self.is_plainly_regular:
             solution += dgetrs(self.factors, self.pivots, right - self.scaled @ solution)[0]
         return np.asarray(solution * self.columns[:, None])
 
@@ -138,6 +145,14 @@ class LeadingMatrix:
 def plainly_regular(size: int) -> float:
     """Return the reciprocal condition number from which on W of so many DOFs needs no closer look."""
     return PLAINLY_REGULAR_IF_SMALL if size <= FEW_DOFS else PLAINLY_REGULAR
+
+
+def _is_a_multiple(known: LeadingMatrix, scaling: Scaling) -> bool:
+    """Return whether a scaling gives what was factorized already, but for one factor."""
+    rows, columns = scaling
+    if known.rows is not None and known.columns is not None:
+        rows, columns = rows / known.rows, columns / known.columns
+    return bool(np.ptp(rows) == 0.0 and np.ptp(columns) == 0.0)
 
 
 def _is_uneven(W: FloatArray, enough: float) -> bool:

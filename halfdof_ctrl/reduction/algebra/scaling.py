@@ -29,6 +29,7 @@ OPEN_DIRECTION = 1e-12  #: of the largest singular value: directions in which th
 MOST_GRADIENT_STEPS = 2000  #: of conjugate gradients for the logarithmic factors of one matrix
 FULLY_SETTLED = 1e-20  #: of the first residual, squared, at which they stop
 ROUGHLY_SETTLED = 1e-8  #: the same where masses are compared, or a large matrix is scaled once more
+FEW_UNKNOWNS = 200  #: rows up to which the least squares with time are solved at once
 DENSE_PATTERN_ROWS = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
 
 
@@ -138,6 +139,8 @@ def log_scaling_with_time(coefficients: FloatArray) -> tuple[FloatArray, FloatAr
     (n,) ndarray, (n,) ndarray, float
         r, c and t.
     """
+    if coefficients.shape[1] > FEW_UNKNOWNS:
+        return _many_logs_with_time(coefficients)
     present = coefficients != 0.0
     power, i, j = np.nonzero(present)
     n = coefficients.shape[1]
@@ -150,6 +153,15 @@ def log_scaling_with_time(coefficients: FloatArray) -> tuple[FloatArray, FloatAr
     right = -np.concatenate([np.bincount(i, logs, n), np.bincount(j, logs, n), [float(power @ logs)]])
     solution = np.linalg.lstsq(normal, right, rcond=OPEN_DIRECTION)[0]
     return solution[:n], solution[n : 2 * n], float(solution[-1])
+
+
+def _many_logs_with_time(coefficients: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+    """Do so for many rows, time first, where the least squares at once would take longer than a reduction."""
+    time = time_log(list(coefficients))
+    power, i, j = np.nonzero(coefficients)
+    logs = np.log2(np.abs(coefficients[power, i, j])) + time * power
+    rows, columns = _scaling_logs(i, j, logs, coefficients.shape[1:], FULLY_SETTLED)
+    return rows, columns, time
 
 
 def log_scaling(matrix: Matrix, settled: float = FULLY_SETTLED, *, powers_of_two: bool = False) -> Scaling:

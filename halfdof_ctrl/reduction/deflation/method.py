@@ -13,7 +13,6 @@ import numpy as np
 
 from halfdof_ctrl.base.arrays import (
     EPS,
-    ComplexArray,
     DenseMatrix,
     FloatArray,
     IndexArray,
@@ -40,7 +39,7 @@ from halfdof_ctrl.reduction.method.loss import Loss, measured_loss
 from halfdof_ctrl.reduction.method.masses import without_light_masses
 from halfdof_ctrl.reduction.method.proof import NEAR_POINTS, ScaledPencil, scaled_pencil
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver, pencil_answer
+from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver, scaled_pencil_solver
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal, without_rounding
 from halfdof_ctrl.reduction.method.units import Units
 
@@ -92,9 +91,9 @@ class Deflation(FromEquations):
         """Return the decisions about blocks of J, equation (16)."""
         return self.evidence.decisions
 
-    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the response of all DOFs to forces."""
-        return pencil_answer(self.model, states.points, force)
+    def answers(self, states: StateSolver) -> Solver:
+        """Return what gives the response of all DOFs to forces."""
+        return scaled_pencil_solver(self.model, states.points)
 
     def inverse_rows(self) -> FloatArray:
         """Refuse: W is singular.

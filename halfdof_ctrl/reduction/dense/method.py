@@ -1,6 +1,7 @@
 """The methods by one dense solve of (3): a selection of DOFs, or orthonormal bases of null spaces."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.linalg
@@ -11,7 +12,7 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.algebra.integers import has_short_entries
-from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, LeadingMatrix
+from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, SURELY_REGULAR, LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling, unit_free_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
@@ -32,10 +33,9 @@ from halfdof_ctrl.reduction.method.loss import (
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver
+from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal
 
-SURELY_REGULAR = 1e-8  #: W of a selection with a smaller rcond is checked by equation (19)
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
 ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
@@ -104,8 +104,11 @@ class SingleSolve(FromEquations):
         regular = RankDecision(matrix="W", dofs=self.model.dofs, singular_values=values, rank=values.size, bound=bound)
         return (*self.coordinates.evidence, regular)
 
-    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the response of all DOFs to forces, by the factors of W."""
+    def answers(self, states: StateSolver) -> Solver:
+        """Return what gives the response of all DOFs to forces, by the factors of W."""
+        return partial(self._answer, states)
+
+    def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         part, both = self.coordinates, np.hstack([force.real, force.imag])
         real, imag = np.hsplit(self.leading.solve(np.asfortranarray(both)), 2)
         n_i, moving = part.n_inertial, part.n_inertial + part.n_half

@@ -104,7 +104,10 @@ def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tu
     n, n_i, moving = solved.shape[0], partition.n_inertial, partition.n_inertial + partition.n_half
     N = moving + n_i
     X = np.zeros((n, N))
-    X[:, :moving] = partition.T[:, :moving]
+    if partition.basis is None:
+        X[partition.order[:moving], np.arange(moving)] = 1.0
+    else:
+        X[:, :moving] = partition.basis[:, :moving]
     inputs: tuple[FloatArray, ...] = ()
     if moving < n:
         X += partition.from_static(solved[moving:, :N])

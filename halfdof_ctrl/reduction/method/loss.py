@@ -13,7 +13,6 @@ docs/explanation/evaluation.md.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -27,6 +26,7 @@ from halfdof_ctrl.base.arrays import (
     Matrix,
     as_dense,
     has_even_entries,
+    is_zero,
     powers_of_two,
 )
 from halfdof_ctrl.base.exact_products import as_it_is
@@ -54,6 +54,7 @@ STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards e
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
+POWER_OF_TWO = 0.5  #: mantissa of a factor that rounds nothing
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 UNCLEAR = 1e-10  #: of a value, or ...
 UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
@@ -96,8 +97,8 @@ class Stored(Protocol):
     def output(self, model: SecondOrderModel) -> Signal:
         """Return the outputs of a model that differs in them alone."""
 
-    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the response of all DOFs, (n, k), to forces (n, k), to a digit or two."""
+    def answers(self, states: StateSolver) -> Solver:
+        """Return what gives the response of all DOFs, (n, k), to forces (n, k), to a digit or two."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,8 +136,8 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
     """Tell at once whether few states, of a plainly regular W, lose nothing that is worth a look.
 
     A is well conditioned, as it stands (`even`) or once its states are of one size and if no entry of M, C and K of few
-    DOFs is tiny beside the others of its matrix; and what static DOFs have of the states and of the inputs does not
-    cancel.
+    DOFs is tiny beside the others of its matrix; what static DOFs have of the states and of the inputs does not cancel,
+    nor do accelerations towards rest.
 
     Examples
     --------
@@ -149,6 +150,8 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
     """
     A, q = equations.A, equations.displacement
     scale: FloatArray | float = 1.0
+    if _mixes_accelerations(model):
+        return False
     if not len(A) or equations.shift:
         return not len(A)
     if not even:
@@ -175,7 +178,8 @@ def measured(stored: Stored) -> Measurement:
     """Compare the stored system with the model at the frequencies that are looked at, for `loss_of` to judge."""
     comparison = _Comparison.of(stored)
     points = comparison.points
-    groups = _neighbours(points) if comparison.is_small else [points[k : k + 1] for k in range(points.size)]
+    together = comparison.is_small or not stored.model.is_sparse  # which takes a few times the room
+    groups = _neighbours(points) if together else [points[k : k + 1] for k in range(points.size)]
     found = [part for group in groups for part in comparison.tried(group)]
     return Measurement(stored.model, comparison.chosen, found)
 
@@ -232,6 +236,15 @@ def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
     return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
 
 
+def _mixes_accelerations(model: SecondOrderModel) -> bool:
+    """Return whether an output is more than one acceleration, or has a factor that rounds a row of A."""
+    if is_zero(model.H):
+        return False
+    H = as_dense(model.H)
+    size = np.abs(H)
+    return bool((np.count_nonzero(H, axis=1) > 1).any() or (size * powers_of_two(size) != POWER_OF_TWO)[H != 0.0].any())
+
+
 def _rounding_of_zeros(value: FloatArray) -> FloatArray:
     """Return below which size a channel is zero but for rounding at each point, in units of rows and columns."""
     rows = value.max(axis=2, keepdims=True)
@@ -256,6 +269,7 @@ class _Comparison:
         chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
         few = len(model.dofs) <= FEW_DOFS
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
+        points = points[np.argsort(np.abs(points))]
         speed = typical_speeds(model)[-1] if few else float(np.median(np.abs(points))) if N else 1.0
         rows, columns = scaling = max_scaling(sizes_at(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
@@ -281,7 +295,7 @@ class _Comparison:
 
     @property
     def is_small(self) -> bool:
-        """Whether all points are looked at together, by factors of P(s) itself."""
+        """Whether factors of P(s) itself answer."""
         return len(self.stored.model.dofs) <= FEW_DOFS
 
     def tried(self, points: ComplexArray) -> list[tuple[ComplexArray, _Measured]]:
@@ -295,7 +309,7 @@ class _Comparison:
     def at(self, points: ComplexArray) -> _Measured:
         """Compare at some points."""
         solver = StateSolver(self.stored.A, points)
-        answer: Solver = pencil_solver(self.motion.R, points) if self.is_small else partial(self._answer, solver)
+        answer = pencil_solver(self.motion.R, points) if self.is_small else self._answers(solver)
         s = np.repeat(points, self.chosen.size)
         u = np.tile(np.eye(self.chosen.size, dtype=np.complex128), points.size)
         said = refined_response(self.states, solver.balanced_solve, s, u)
@@ -303,7 +317,7 @@ class _Comparison:
         grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], s, u)
         settled = self._settled(points, said, true, grown)
         rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
-        moved = self._undetermined(answer, s, true)
+        moved = self._undetermined(answer, points, s, true)
         small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
         rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
         shape = (len(value), points.size, self.chosen.size)
@@ -338,17 +352,18 @@ class _Comparison:
         enough = np.maximum(UNCLEAR * size, UNCLEAR_CHANNEL * (true.shown + said.shown))
         return size, np.asarray(UNSETTLED * (true.rounding + said.rounding) <= enough)
 
-    def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the answer of all DOFs in the scaled units."""
-        rows, columns = self.scaling
-        return np.asarray(self.stored.answer(states, force / rows[:, None]) / columns[:, None])
+    def _answers(self, states: StateSolver) -> Solver:
+        """Return what gives the answer of all DOFs in the scaled units."""
+        (rows, columns), answer = self.scaling, self.stored.answers(states)
+        return lambda force: np.asarray(answer(force / rows[:, None]) / columns[:, None])
 
-    def _undetermined(self, answer: Solver, s: ComplexArray, true: Response) -> FloatArray:
+    def _undetermined(self, answer: Solver, points: ComplexArray, s: ComplexArray, true: Response) -> FloatArray:
         """Return what rounding of M, C, K at random changes in the outputs."""
-        terms, generator = sizes_of_terms(self.motion.R, s, true.x), np.random.default_rng(0)
-        forces = [EPS * terms * generator.uniform(-1.0, 1.0, terms.shape) for _ in range(TRIED_ROUNDINGS)]
-        changes = [np.abs(self.motion.seen(s, answer(force.astype(np.complex128)))) for force in forces]
-        return np.asarray(np.max(changes, axis=0))
+        terms = sizes_of_terms(self.motion.R, s, true.x).reshape(len(true.x), points.size, 1, -1)
+        signs = np.random.default_rng(0).uniform(-1.0, 1.0, (*terms.shape[:2], TRIED_ROUNDINGS, terms.shape[3]))
+        force = (EPS * terms * signs).reshape(len(true.x), -1).astype(np.complex128)  # of each point side by side
+        changes = np.abs(self.motion.seen(np.repeat(points, force.shape[1] // points.size), answer(force)))
+        return np.asarray(changes.reshape(len(changes), *signs.shape[1:]).max(axis=2).reshape(len(changes), -1))
 
 
 def _speeds_of_signals(motion: Equations) -> list[float]:

@@ -15,7 +15,7 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, as_d
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
+from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 
 Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
@@ -199,16 +199,23 @@ def pencil_solver(P: Sequence[Matrix], points: ComplexArray) -> Solver:
     return solve
 
 
-def pencil_answer(model: SecondOrderModel, points: ComplexArray, force: ComplexArray) -> ComplexArray:
-    """Return the response of all DOFs to forces, (n, k), to a digit or two, by factors of P(s) in even units."""
-    P = model.quadratics.P
-    scaling = max_scaling(sizes_at(P, float(np.abs(points).max())), even=2.0)
-    solve = pencil_solver([_scaled(part, scaling) for part in P], points)
-    return np.asarray(scaling.columns[:, None] * solve(scaling.rows[:, None] * force))
+def scaled_pencil_solver(model: SecondOrderModel, points: ComplexArray) -> Solver:
+    """Factorize ``P(s)`` of a model at each point, in units that are even there, and return what solves with it.
 
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        A point is an eigenvalue.
+    """
+    P = [as_dense(part) for part in model.quadratics.P]
+    scalings = [max_scaling(sizes_at(P, abs(s)), even=2.0) for s in points.tolist()]
+    solvers = [pencil_solver([scaling.of(part) for part in P], points[k : k + 1]) for k, scaling in enumerate(scalings)]
 
-def _scaled(matrix: Matrix, scaling: Scaling) -> Matrix:
-    return scaling.of(matrix) if isinstance(matrix, np.ndarray) else scaling.of_sparse(matrix)
+    def solve(force: ComplexArray) -> ComplexArray:
+        parts = zip(scalings, solvers, np.hsplit(force, len(solvers)), strict=True)
+        return np.hstack([columns[:, None] * inner(rows[:, None] * part) for (rows, columns), inner, part in parts])
+
+    return solve
 
 
 def factorized(matrix: ComplexArray) -> tuple[Any, ...]:

@@ -6,6 +6,7 @@ regular. Otherwise its dense copy is, so that both give the same.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
 from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, measured_loss
 from halfdof_ctrl.reduction.method.protocol import MethodName
-from halfdof_ctrl.reduction.method.refined_answers import StateSolver
+from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
 from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
@@ -108,8 +109,11 @@ class SparseSolve:
         """Return the decisions of the coordinates."""
         return self.coordinates.evidence
 
-    def answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
-        """Return the response of all DOFs to forces, by the factors of W."""
+    def answers(self, states: StateSolver) -> Solver:
+        """Return what gives the response of all DOFs to forces, by the factors of W."""
+        return partial(self._answer, states)
+
+    def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         part = self.coordinates
         both = np.hstack([force.real, force.imag]) * self.leading.rows[:, None]
         real, imag = np.hsplit(self.leading.solve(both), 2)
