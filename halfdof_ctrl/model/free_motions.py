@@ -139,6 +139,7 @@ def _improved(K: FloatArray, values: FloatArray, vectors: FloatArray, free: Inde
     """Take out of free motions what rounding of the decomposition left in them."""
     motions = vectors[:, free]
     rest = np.delete(np.arange(values.size), free)
+    rest = rest[values[rest] != 0.0]  # another one that rounding has moved to zero takes nothing out
     for _ in range(IMPROVEMENTS):
         share = vectors[:, rest].T @ exact_product(K, motions) / values[rest, None]
         motions = motions - vectors[:, rest] @ share

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from halfdof_ctrl import mechss
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.model.free_motions import free_motion_count
+from halfdof_ctrl.model.free_motions import _improved, free_motion_count
 from support.beams import beam_matrices
 
 
@@ -79,3 +79,9 @@ def test_what_moves_without_mass_and_damping_is_not_counted() -> None:
 def test_nothing_is_said_of_what_is_not_semidefinite(K: FloatArray) -> None:
     """Unsymmetric, negative, complex and indefinite stiffness."""
     assert free_motion_count(np.eye(2), np.zeros((2, 2)), K) is None
+
+
+def test_another_motion_that_rounding_has_moved_to_zero_is_no_division_by_zero() -> None:
+    """Two eigenvalues of exactly 0, of which one vector counts as free: it stays what it is."""
+    motion = _improved(np.diag([0.0, 0.0, 3.0]), np.array([0.0, 0.0, 3.0]), np.eye(3), np.array([0]))
+    assert motion.tolist() == [[1.0], [0.0], [0.0]]

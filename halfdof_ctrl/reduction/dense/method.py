@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, has_even_entries
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, has_even_entries, is_zero
 from halfdof_ctrl.base.errors import SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -17,7 +17,12 @@ from halfdof_ctrl.reduction.algebra.scaling import max_scaling, unit_free_scalin
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.dense.selection import select_columns
-from halfdof_ctrl.reduction.dense.single_solve import leading_columns, rounding_of_solve, solved_at_once
+from halfdof_ctrl.reduction.dense.single_solve import (
+    leading_columns,
+    plain_rounding,
+    rounding_of_solve,
+    solved_at_once,
+)
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import (
@@ -30,6 +35,7 @@ from halfdof_ctrl.reduction.method.loss import (
     measured,
     measured_loss,
 )
+from halfdof_ctrl.reduction.method.loss_bound import is_bounded
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
@@ -197,10 +203,21 @@ def _loses_nothing(found: SingleSolve) -> bool:
     if not found.leading.is_plainly_regular or part.basis is not None:
         return False
     if len(found.A) <= ASKED_STATES:
-        return loses_nothing(found.model, found.equations, even=found.is_even)
+        return loses_nothing(found.model, found.equations, even=found.is_even) or _is_bounded(found)
     inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
     inertial[part.order[: part.n_inertial]] = True
     return not spread_is_wide(found.model, inertial)
+
+
+def _is_bounded(found: SingleSolve) -> bool:
+    """Return whether a bound of rounding excludes a loss, for ordinary displacements and velocities as outputs."""
+    model, equations = found.model, found.equations
+    if not len(found.A) or equations.shift or not is_zero(model.H):
+        return False
+    if not all(has_even_entries(part) for part in model.quadratics.P):
+        return False
+    errors = plain_rounding(found.coordinates, found.leading, equations)
+    return is_bounded(model, equations, found.output(model), errors)
 
 
 def _is_ordinary(found: SingleSolve) -> bool:

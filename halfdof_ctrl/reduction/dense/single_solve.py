@@ -17,6 +17,7 @@ from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
 
 NO_SHIFT: tuple[FloatArray, ...] = ()  #: of (5), where no derivative of the inputs drives the states
+PLAIN_ROUNDING = 4 * EPS  #: what a solution of few unknowns is known to, of the sums that it comes from
 SOLVE_ROUNDING = 32 * EPS  #: times n: what a solution of (3) is known to, of its largest scaled unknown
 
 
@@ -54,6 +55,25 @@ def solved_at_once(model: SecondOrderModel, partition: DofPartition, leading: Le
         B, shift = absorbed(A, [rate[:, start : start + m] for start in range(N, right.shape[1], m)])
     displacement = _displacement(partition, solved, m, shift)
     return StateEquations(A=read_only(A), B=read_only(B), displacement=displacement, shift=shift)
+
+
+def plain_rounding(partition: DofPartition, leading: LeadingMatrix, equations: StateEquations) -> StateEquations:
+    """Bound what the entries of a selection's equations are known to: a few roundings of |W^-1| |L| |U| times them.
+
+    For inputs without derivatives.
+    """
+    n_i, moving = partition.n_inertial, partition.n_inertial + partition.n_half
+    A, B, q = equations.A, equations.B, equations.displacement
+    (N, m), static = B.shape, partition.order[moving:]
+    solved = np.zeros((len(partition.order), N + m))
+    solved[:n_i], solved[n_i:moving] = np.hstack([A, B])[moving:], np.hstack([A, B])[n_i:moving]
+    solved[moving:] = np.hstack([q.X, q.direct(m)])[static]
+    growth = np.abs(leading.solve(np.eye(len(solved)))) @ leading.elimination_size()
+    known = PLAIN_ROUNDING * growth @ np.abs(solved)
+    rate, X, U = np.zeros((N, N + m)), np.zeros(q.X.shape), np.zeros((len(solved), m))
+    rate[moving:], rate[n_i:moving] = known[:n_i], known[n_i:moving]
+    X[static], U[static] = known[moving:, :N], known[moving:, N:]
+    return StateEquations(A=rate[:, :N], B=rate[:, N:], displacement=Signal(X, (U,)), shift=())
 
 
 def rounding_of_solve(
