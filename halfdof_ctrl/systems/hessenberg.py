@@ -10,12 +10,12 @@ stable (N. J. Higham, Accuracy and Stability of Numerical Algorithms, section 14
 and (10) runs over the states with all points side by side, in blocks that are matrix products.
 
 What Q mixes is lost where the output is small against the state, as in roll-off or far below the fastest pole. To
-first order the relative error of a response H = c x is below
+first order the relative error of a response H = c x + d is below
 
     eps |A| |x| |y| / |H|,    (s I - A)^T y = c,    |y| about |x| |c| / |b|,
 
 the last by reciprocity. Where that is much, H is corrected once by the adjoint solution y on the residual in the
-original coordinates, c x + y^T (b - (s I - A) x). What is left is the product of the errors of x and y, and what
+original coordinates, c x + d + y^T (b - (s I - A) x). What is left is the product of the errors of x and y, and what
 rounding does to the residual, entry by entry below
 
     eps |y|^T (|s| |x| + |A| |x| + |b|);
@@ -135,17 +135,22 @@ class _Channels:
             rotated = self.C @ solver.Q
             for start in range(0, points.size, batch):
                 part = slice(start, start + batch)
-                values[:, j, part] += self._responses(j, solver, rotated, points[part])
+                values[:, j, part] += self._responses(j, solver, rotated, points[part], values[:, j, part])
         return self.bound
 
-    def _responses(self, j: int, solver: "ShiftedSolver", rotated: FloatArray, points: ComplexArray) -> ComplexArray:
-        """Return the response to one input, corrected where its bound says so."""
+    def _responses(
+        self, j: int, solver: "ShiftedSolver", rotated: FloatArray, points: ComplexArray, direct: ComplexArray
+    ) -> ComplexArray:
+        """Return the response to one input besides the direct one, corrected where its bound says so."""
         x = solver.solve(points)
         with np.errstate(invalid="ignore", over="ignore"):
             response = _real_times_complex(rotated, x)
-            size = np.abs(response)
+            size = np.abs(response + direct)
             bound = EPS * self.size * self.lengths[:, None] * _squared_norms(x) / abs(solver.beta)
             small, hopeless = bound > self.risk * size, bound > size
+            cancelled = EPS * np.abs(direct) > self.risk * size  # which no solution of another x mends
+        if cancelled.any():
+            self.bound = np.inf
         if not small.any():
             self.bound = max(self.bound, self.risk)
             return response
@@ -156,18 +161,19 @@ class _Channels:
         for i in np.flatnonzero(small.any(axis=1)).tolist():
             at = np.flatnonzero(small[i])
             risk = bound[i, at] / size[i, at]
-            response[i, at] = self._corrected(response[i, at], (i, j), points[at], (solver, x[:, at]), risk)
+            solution = solver, x[:, at]
+            response[i, at] = self._corrected(direct[i, at], (i, j), points[at], solution, risk)
         return response
 
     def _corrected(
         self,
-        response: ComplexArray,
+        direct: ComplexArray,
         channel: tuple[int, int],
         points: ComplexArray,
         solution: tuple["ShiftedSolver", ComplexArray],
         risk: FloatArray,
     ) -> ComplexArray:
-        """Add ``y^T (b - (s I - A) x)`` to the response ``c x``, or solve again where that is not small."""
+        """Return ``c x + y^T (b - (s I - A) x)``, x no longer mixed, or solve again where that is far from c x."""
         (i, j), (solver, x) = channel, solution
         b, c = self.B[:, j], self.C[i]
         if i not in self.adjoints:
@@ -177,8 +183,9 @@ class _Channels:
         residual = b[:, None] - points * state + _real_times_complex(self.A, state)
         y = _real_times_complex(adjoint.Q, adjoint.solve(points))
         correction = (y * residual).sum(axis=0)
-        refined = np.asarray(response + correction)
-        unsafe = np.abs(correction) > UNSAFE_CORRECTION * np.abs(refined)
+        refined = np.asarray(_real_times_complex(c[None], state)[0] + correction)
+        total = np.abs(refined + direct)
+        unsafe = np.abs(correction) > UNSAFE_CORRECTION * total
         if unsafe.any():
             refined[unsafe] = sparse_response(self.A, b, c, points[unsafe])
             self.bound = np.inf
@@ -188,7 +195,8 @@ class _Channels:
             terms = np.abs(points[looked_at]) * x_size + np.abs(self.A) @ x_size + np.abs(b)[:, None]
             shares = EPS * y_size * terms
             rounding = np.minimum(shares.sum(axis=0), INDEPENDENT * np.linalg.norm(shares, axis=0))
-            left = (rounding + np.abs(correction[looked_at]) * UNSAFE_CORRECTION) / np.abs(refined[looked_at])
+            rounding += EPS * (np.abs(c) @ x_size)
+            left = (rounding + np.abs(correction[looked_at]) * UNSAFE_CORRECTION) / total[looked_at]
             self.bound = max(self.bound, float(left.max()))
         return refined
 

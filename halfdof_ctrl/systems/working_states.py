@@ -129,7 +129,8 @@ def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: C
     """
     model, evaluated = reduction.model, bounded_response(*dofs, points)
     values = evaluated.values
-    if evaluated.bound <= min(SOUND_BOUND, SOUND_STORED * reduction.rcond):
+    stored = reduction.solution.evidence.loss.value
+    if stored <= SOUND_RESPONSE and evaluated.bound <= min(SOUND_BOUND, SOUND_STORED * reduction.rcond):
         return values
     if not model.is_sparse and _is_sound(model, values, points):
         return values
