@@ -32,6 +32,7 @@ from halfdof_ctrl.base.arrays import (
 from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.integers import has_short_entries
 from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.method.long_answers import long_responses
@@ -50,6 +51,7 @@ from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
+STAYS = 4.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
@@ -118,6 +120,7 @@ class Measurement:
 
     model: SecondOrderModel
     chosen: IndexArray  #: (k,) which inputs
+    slowest: float  #: [rad/s] where the model moves
     found: Sequence[tuple[ComplexArray, _Measured]]  #: points, and what is lost there
 
 
@@ -161,12 +164,33 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
         scale = factors[:, None]
         if not is_well_conditioned(A):
             return False
+    plain = not any(part.any() for part in (*model.quadratics.F[1:], *model.quadratics.D))
+    if not q.U and plain:
+        return True
+    x = np.asarray(scale * np.linalg.solve(A, equations.B / scale))
+    return _is_kept(q, x) and (plain or _are_seen(model, equations, x))
+
+
+def _is_kept(q: Signal, x: FloatArray) -> bool:
+    """Return whether displacements at rest, -x times inputs, are no small differences of their parts."""
     if not q.U:
         return True
-    x = scale * np.linalg.solve(A, equations.B / scale)
     terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
     left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
     return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
+
+
+def _are_seen(model: SecondOrderModel, equations: StateEquations, x: FloatArray) -> bool:
+    """Return whether outputs that mix displacements with others are no small differences of their parts at rest."""
+    F, D = model.quadratics.F, np.asarray(model.quadratics.D[0])
+    terms, left = np.abs(D), D
+    for k, part in enumerate(F):
+        motion = equations.motion(k)
+        direct = motion.U[0] if motion.U else np.zeros((len(motion.X), x.shape[1]))
+        terms = terms + np.abs(part) @ (np.abs(motion.X) @ np.abs(x) + np.abs(direct))
+        left = left + F[0] @ (direct - motion.X @ x) if k == 0 else left
+    mixed = np.asarray(F[0].any(axis=1))[:, None] | (D != 0.0)
+    return bool((~mixed | (terms <= EVEN_STATES * np.abs(left))).all())
 
 
 def measured_loss(stored: Stored) -> Loss:
@@ -181,7 +205,7 @@ def measured(stored: Stored) -> Measurement:
     together = comparison.is_small or not stored.model.is_sparse  # which takes a few times the room
     groups = _neighbours(points) if together else [points[k : k + 1] for k in range(points.size)]
     found = [part for group in groups for part in comparison.tried(group)]
-    return Measurement(stored.model, comparison.chosen, found)
+    return Measurement(stored.model, comparison.chosen, comparison.slowest, found)
 
 
 def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
@@ -204,6 +228,7 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
     size = np.maximum(np.maximum(value, grown), _slopes_from(np.abs(at), value))
+    missed = np.where(_stays(np.abs(at), value, measurement.slowest), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
         return NOTHING_LOST
@@ -245,6 +270,19 @@ def _mixes_accelerations(model: SecondOrderModel) -> bool:
     return bool((np.count_nonzero(H, axis=1) > 1).any() or (size * powers_of_two(size) != POWER_OF_TWO)[H != 0.0].any())
 
 
+def _stays(omega: FloatArray, value: FloatArray, slowest: float) -> npt.NDArray[np.bool_]:
+    """Return which channels, below the slowest frequency of a model, are about what they are at the next point.
+
+    Others rise or fall towards rest without end, and no one looks at them there.
+    """
+    stays = np.ones(value.shape, dtype=np.bool_)
+    below = int(np.count_nonzero(omega < slowest))
+    lower, higher = value[:below], value[1 : below + 1]
+    ratio = np.divide(lower, higher, out=np.zeros_like(lower), where=higher > 0.0)
+    stays[:below] = (ratio > 1.0 / STAYS) & (ratio < STAYS)
+    return stays
+
+
 def _rounding_of_zeros(value: FloatArray) -> FloatArray:
     """Return below which size a channel is zero but for rounding at each point, in units of rows and columns."""
     rows = value.max(axis=2, keepdims=True)
@@ -262,6 +300,8 @@ class _Comparison:
     motion: Equations  #: of the model, scaled
     states: Equations  #: of the state space, balanced
     chosen: IndexArray  #: which inputs
+    slowest: float  #: [rad/s] where the model moves: below, only channels are looked at that stay what they are
+    unrounded: bool  #: whether no entry of M, C and K fills the digits of a double
 
     @classmethod
     def of(cls, stored: Stored) -> "_Comparison":
@@ -289,9 +329,19 @@ class _Comparison:
             C=[output.X * scale, *[np.zeros_like(output.X) for _ in direct[1:]]],
             D=direct,
         )
+        slowest = 0.0
         if few:
-            points = points_of_few(model, stored.A, _speeds_of_signals(motion))
-        return cls(stored=stored, points=points, scaling=scaling, motion=motion, states=states, chosen=chosen)
+            points, slowest = points_of_few(model, stored.A, _speeds_of_signals(motion))
+        return cls(
+            stored=stored,
+            points=points,
+            scaling=scaling,
+            motion=motion,
+            states=states,
+            chosen=chosen,
+            slowest=slowest,
+            unrounded=few and all(has_short_entries(as_dense(part)) for part in model.quadratics.P),
+        )
 
     @property
     def is_small(self) -> bool:
@@ -358,7 +408,9 @@ class _Comparison:
         return lambda force: np.asarray(answer(force / rows[:, None]) / columns[:, None])
 
     def _undetermined(self, answer: Solver, points: ComplexArray, s: ComplexArray, true: Response) -> FloatArray:
-        """Return what rounding of M, C, K at random changes in the outputs."""
+        """Return what rounding of M, C, K at random changes in the outputs: nothing where they were not rounded."""
+        if self.unrounded:
+            return np.zeros(true.y.shape)
         terms = sizes_of_terms(self.motion.R, s, true.x).reshape(len(true.x), points.size, 1, -1)
         signs = np.random.default_rng(0).uniform(-1.0, 1.0, (*terms.shape[:2], TRIED_ROUNDINGS, terms.shape[3]))
         force = (EPS * terms * signs).reshape(len(true.x), -1).astype(np.complex128)  # of each point side by side
@@ -367,11 +419,12 @@ class _Comparison:
 
 
 def _speeds_of_signals(motion: Equations) -> list[float]:
-    """Return the frequencies at which an input, an output or what passes directly changes its kind."""
+    """Return where equations, DOFs, inputs, outputs and what passes directly change their kind."""
+    equations, unknowns = ([np.abs(as_dense(part)).max(axis=k, initial=0.0) for part in motion.R] for k in (1, 0))
     into = [np.abs(part).max(axis=0, initial=0.0) for part in motion.B]
     out = [np.abs(as_dense(part)).max(axis=1, initial=0.0) for part in motion.C]
     direct = [np.abs(part).ravel() for part in motion.D]
-    return [speed for signals in (into, out, direct) for speed in signal_speeds(signals)]
+    return [speed for signals in (equations, unknowns, into, out, direct) for speed in signal_speeds(signals)]
 
 
 def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:

@@ -32,7 +32,7 @@ AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
-TOWARDS_REST = 0.1  #: of the slowest frequency of a model of few DOFs without free motions
+TOWARDS_REST = (1e-12, 1e-8, 1e-4, 0.1)  #: of the slowest frequency of a model of few DOFs without free motions
 DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
 SAME_SPEED = 4.0  #: ratio of two frequencies of signals of which one is enough
 MOST_OF_SIGNALS = 8  #: frequencies of signals that are looked at, spread over all
@@ -80,8 +80,8 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     )
 
 
-def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> ComplexArray:
-    """Choose points for a model of few DOFs.
+def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> tuple[ComplexArray, float]:
+    """Choose points for a model of few DOFs, and return the lowest frequency at which it moves too.
 
     Parameters
     ----------
@@ -92,18 +92,21 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     """
     speeds, slow = typical_speeds(model), np.abs(loss_points(A)) if len(A) else np.zeros(0)
     own = np.concatenate([slow[slow > SLOWEST_SPEED * min(speeds)], np.outer(speeds, TYPICAL_SPEEDS).ravel()])
-    least = _end_of_drift(model, A)
-    chosen = np.unique(np.concatenate([own, [slowest_speed(model) * BESIDE_MODE], _apart(np.asarray(signals))]))
-    chosen = chosen[chosen >= min(least, chosen[-1])]
-    wide = np.concatenate([[TOWARDS_REST * chosen[0] if least == 0.0 else chosen[0]], chosen])
-    step = max(DECADE, float(wide[-1] / wide[0]) ** (1.0 / MOST_BETWEEN))
+    corners = _apart(np.asarray(signals))
+    free = free_motion_count(model.M, model.C, model.K)
+    chosen = np.unique(np.concatenate([own, [slowest_speed(model) * BESIDE_MODE], corners]))
+    if free is not None:
+        chosen = chosen[chosen >= min(_end_of_drift(A, free.poles, corners), chosen[-1])]
+    rest = chosen[0] * np.array(TOWARDS_REST if free is None else ())
+    step = max(DECADE, float(chosen[-1] / chosen[0]) ** (1.0 / MOST_BETWEEN))
     between = [
         low * (high / low) ** (np.arange(1, count) / count)
-        for low, high in pairwise(wide)
+        for low, high in pairwise(chosen)
         if (count := int(np.ceil(np.log(high / low) / np.log(step)))) > 1
     ]
-    mantissa, exponent = np.frexp(np.concatenate([wide, *between]))
-    return np.asarray(1j * np.unique(np.ldexp(np.rint(np.ldexp(mantissa, FEW_BITS)), exponent - FEW_BITS)))
+    mantissa, exponent = np.frexp(np.concatenate([rest, chosen, *between]))
+    every = np.unique(np.ldexp(np.rint(np.ldexp(mantissa, FEW_BITS)), exponent - FEW_BITS))
+    return np.asarray(1j * every), float(every[len(rest)])
 
 
 def typical_speeds(model: SecondOrderModel) -> list[float]:
@@ -148,17 +151,14 @@ def _apart(speeds: FloatArray) -> FloatArray:
     return np.asarray(SAME_SPEED ** logs[places])
 
 
-def _end_of_drift(model: SecondOrderModel, A: FloatArray) -> float:
+def _end_of_drift(A: FloatArray, free: int, corners: FloatArray) -> float:
     """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
 
     A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2. That
-    is no excuse where other poles are.
+    is no excuse where other poles are, nor, if there are none, where equations or signals change their kind.
     """
-    free = free_motion_count(model.M, model.C, model.K)
-    if free is None:
-        return 0.0
     sizes = np.sort(np.abs(np.linalg.eigvals(A)))
-    moved, others = sizes[: free.poles], sizes[free.poles :]
+    moved, others = sizes[:free], sizes[free:] if sizes.size > free else corners
     twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
     end = float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=sys.float_info.min))
     return min(end, TYPICAL_SPEEDS[0] * float(others.min(initial=np.inf)))
