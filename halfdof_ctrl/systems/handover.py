@@ -12,7 +12,8 @@ from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_co
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.evidence import warn_of_lost_digits
-from halfdof_ctrl.reduction.method.loss import TEN_TIMES_DATA, is_well_conditioned, loss_of, measured
+from halfdof_ctrl.reduction.method.loss import TEN_TIMES_DATA, loss_of, measured
+from halfdof_ctrl.reduction.method.loss_bound import is_well_conditioned
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver, scaled_pencil_solver
 from halfdof_ctrl.reduction.method.signals import Signal, trimmed
 from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation

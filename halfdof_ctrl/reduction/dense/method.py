@@ -29,13 +29,11 @@ from halfdof_ctrl.reduction.method.loss import (
     NOTHING_LOST,
     TEN_TIMES_DATA,
     Loss,
-    is_well_conditioned,
-    loses_nothing,
     loss_of,
     measured,
     measured_loss,
 )
-from halfdof_ctrl.reduction.method.loss_bound import is_bounded
+from halfdof_ctrl.reduction.method.loss_bound import is_bounded, is_well_conditioned, loses_nothing
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName

@@ -11,6 +11,7 @@ smaller than the rounding of any of them; of P(s)^-1 r the first digit counts. D
 docs/explanation/evaluation.md.
 """
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
@@ -25,18 +26,22 @@ from halfdof_ctrl.base.arrays import (
     IndexArray,
     Matrix,
     as_dense,
-    has_even_entries,
-    is_zero,
     powers_of_two,
 )
 from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.integers import has_short_entries
-from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.method.long_answers import long_responses
-from halfdof_ctrl.reduction.method.loss_points import loss_points, points_of_few, signal_speeds, typical_speeds
+from halfdof_ctrl.reduction.method.loss_points import (
+    Slow,
+    loss_points,
+    points_of_few,
+    signal_speeds,
+    typical_speeds,
+)
 from halfdof_ctrl.reduction.method.refined_answers import (
     Equations,
     Response,
@@ -47,16 +52,16 @@ from halfdof_ctrl.reduction.method.refined_answers import (
     sizes_at,
     sizes_of_terms,
 )
-from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
+from halfdof_ctrl.reduction.method.signals import Signal
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
 STAYS = 4.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
+AT_CORNER = 1.5  #: power of s by which a channel may rise or fall below what moves, where signals change their kind
 STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
-POWER_OF_TWO = 0.5  #: mantissa of a factor that rounds nothing
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 UNCLEAR = 1e-10  #: of a value, or ...
 UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
@@ -64,7 +69,6 @@ LONG_ZERO = 1e-60  #: of what a channel could be: less is nothing in hundreds of
 UNDETERMINED = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
 SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
-EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels, up to which few states lose nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,77 +124,8 @@ class Measurement:
 
     model: SecondOrderModel
     chosen: IndexArray  #: (k,) which inputs
-    slowest: float  #: [rad/s] where the model moves
+    slow: Slow  #: below which little is looked at
     found: Sequence[tuple[ComplexArray, _Measured]]  #: points, and what is lost there
-
-
-def is_well_conditioned(A: FloatArray) -> bool:
-    """Return whether the condition number of A is below a thousand, so that solving with it loses three digits at most.
-
-    Examples
-    --------
-    >>> [is_well_conditioned(np.diag([1.0, part])) for part in (0.1, 1e-6)]
-    [True, False]
-    """
-    return not len(A) or EVEN_STATES * lu_and_rcond(A)[2] >= 1.0
-
-
-def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: bool) -> bool:
-    """Tell at once whether few states, of a plainly regular W, lose nothing that is worth a look.
-
-    A is well conditioned, as it stands (`even`) or once its states are of one size and if no entry of M, C and K of few
-    DOFs is tiny beside the others of its matrix; what static DOFs have of the states and of the inputs does not cancel,
-    nor do accelerations towards rest.
-
-    Examples
-    --------
-    A mass on a spring, and one of which nearly nothing is left:
-
-    >>> from halfdof_ctrl import exact_reduction, mechss
-    >>> [loses_nothing(model, exact_reduction(model).solution.equations, even=False)
-    ...  for model in (mechss([[1]], [[0.1]], [[4]]), mechss([[1e-9]], [[0.1]], [[4]]))]
-    [True, False]
-    """
-    A, q = equations.A, equations.displacement
-    scale: FloatArray | float = 1.0
-    if _mixes_accelerations(model):
-        return False
-    if not len(A) or equations.shift:
-        return not len(A)
-    if not even:
-        if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part) for part in model.quadratics.P):
-            return False
-        A, factors = balanced_states(A)
-        scale = factors[:, None]
-        if not is_well_conditioned(A):
-            return False
-    plain = not any(part.any() for part in (*model.quadratics.F[1:], *model.quadratics.D))
-    if not q.U and plain:
-        return True
-    x = np.asarray(scale * np.linalg.solve(A, equations.B / scale))
-    return _is_kept(q, x) and (plain or _are_seen(model, equations, x))
-
-
-def _is_kept(q: Signal, x: FloatArray) -> bool:
-    """Return whether displacements at rest, -x times inputs, are no small differences of their parts."""
-    if not q.U:
-        return True
-    terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
-    left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
-    return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
-
-
-def _are_seen(model: SecondOrderModel, equations: StateEquations, x: FloatArray) -> bool:
-    """Return whether outputs that mix displacements with others are no small differences of their parts at rest."""
-    F, D = model.quadratics.F, np.asarray(model.quadratics.D[0])
-    terms, left = np.abs(D), D
-    for k, part in enumerate(F):
-        motion = equations.motion(k)
-        direct = motion.U[0] if motion.U else np.zeros((len(motion.X), x.shape[1]))
-        terms = terms + np.abs(part) @ (np.abs(motion.X) @ np.abs(x) + np.abs(direct))
-        left = left + F[0] @ (direct - motion.X @ x) if k == 0 else left
-    mixed = np.asarray(F[0].any(axis=1))[:, None] | (D != 0.0)
-    return bool((~mixed | (terms <= EVEN_STATES * np.abs(left))).all())
 
 
 def measured_loss(stored: Stored) -> Loss:
@@ -205,7 +140,7 @@ def measured(stored: Stored) -> Measurement:
     together = comparison.is_small or not stored.model.is_sparse  # which takes a few times the room
     groups = _neighbours(points) if together else [points[k : k + 1] for k in range(points.size)]
     found = [part for group in groups for part in comparison.tried(group)]
-    return Measurement(stored.model, comparison.chosen, comparison.slowest, found)
+    return Measurement(stored.model, comparison.chosen, comparison.slow, found)
 
 
 def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
@@ -228,7 +163,7 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
     size = np.maximum(np.maximum(value, grown), _slopes_from(np.abs(at), value))
-    missed = np.where(_stays(np.abs(at), value, measurement.slowest), missed, 0.0)
+    missed = np.where(_stays(np.abs(at), value, measurement.slow), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
         return NOTHING_LOST
@@ -261,25 +196,18 @@ def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
     return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
 
 
-def _mixes_accelerations(model: SecondOrderModel) -> bool:
-    """Return whether an output is more than one acceleration, or has a factor that rounds a row of A."""
-    if is_zero(model.H):
-        return False
-    H = as_dense(model.H)
-    size = np.abs(H)
-    return bool((np.count_nonzero(H, axis=1) > 1).any() or (size * powers_of_two(size) != POWER_OF_TWO)[H != 0.0].any())
+def _stays(omega: FloatArray, value: FloatArray, slow: Slow) -> npt.NDArray[np.bool_]:
+    """Return which channels change no faster, to the next point, than one that is looked at: below all that moves.
 
-
-def _stays(omega: FloatArray, value: FloatArray, slowest: float) -> npt.NDArray[np.bool_]:
-    """Return which channels, below the slowest frequency of a model, are about what they are at the next point.
-
-    Others rise or fall towards rest without end, and no one looks at them there.
+    Towards rest others fall or rise without end.
     """
     stays = np.ones(value.shape, dtype=np.bool_)
-    below = int(np.count_nonzero(omega < slowest))
+    below = min(int(np.count_nonzero(omega < slow.typical)), len(omega) - 1)
     lower, higher = value[:below], value[1 : below + 1]
     ratio = np.divide(lower, higher, out=np.zeros_like(lower), where=higher > 0.0)
-    stays[:below] = (ratio > 1.0 / STAYS) & (ratio < STAYS)
+    steepest = np.where(omega[:below] < slow.least, 0.0, AT_CORNER)
+    most = STAYS * (omega[1 : below + 1] / omega[:below]) ** steepest
+    stays[:below] = np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min)) < most[:, None, None]
     return stays
 
 
@@ -300,7 +228,7 @@ class _Comparison:
     motion: Equations  #: of the model, scaled
     states: Equations  #: of the state space, balanced
     chosen: IndexArray  #: which inputs
-    slowest: float  #: [rad/s] where the model moves: below, only channels are looked at that stay what they are
+    slow: Slow  #: below which only channels are looked at that stay about what they are
     unrounded: bool  #: whether no entry of M, C and K fills the digits of a double
 
     @classmethod
@@ -329,9 +257,9 @@ class _Comparison:
             C=[output.X * scale, *[np.zeros_like(output.X) for _ in direct[1:]]],
             D=direct,
         )
-        slowest = 0.0
+        slow = Slow(0.0, 0.0)
         if few:
-            points, slowest = points_of_few(model, stored.A, _speeds_of_signals(motion))
+            points, slow = points_of_few(model, stored.A, _speeds_of_signals(motion))
         return cls(
             stored=stored,
             points=points,
@@ -339,7 +267,7 @@ class _Comparison:
             motion=motion,
             states=states,
             chosen=chosen,
-            slowest=slowest,
+            slow=slow,
             unrounded=few and all(has_short_entries(as_dense(part)) for part in model.quadratics.P),
         )
 
@@ -419,12 +347,11 @@ class _Comparison:
 
 
 def _speeds_of_signals(motion: Equations) -> list[float]:
-    """Return where equations, DOFs, inputs, outputs and what passes directly change their kind."""
-    equations, unknowns = ([np.abs(as_dense(part)).max(axis=k, initial=0.0) for part in motion.R] for k in (1, 0))
+    """Return where inputs, outputs and what passes directly change their kind."""
     into = [np.abs(part).max(axis=0, initial=0.0) for part in motion.B]
     out = [np.abs(as_dense(part)).max(axis=1, initial=0.0) for part in motion.C]
     direct = [np.abs(part).ravel() for part in motion.D]
-    return [speed for signals in (equations, unknowns, into, out, direct) for speed in signal_speeds(signals)]
+    return [speed for signals in (into, out, direct) for speed in signal_speeds(signals)]
 
 
 def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:

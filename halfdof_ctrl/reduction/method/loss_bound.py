@@ -1,19 +1,20 @@
-"""A bound of what stored A, B, C, D lose, for models of which it says that nothing is lost.
+"""What says that stored A, B, C, D lose nothing worth a look: their condition, or a bound of what rounding does.
 
 Rounding that moves A and B by dA and dB, and displacements q = X x + U u by dX and dU, moves outputs
 y = F q + G q' + D u, to first order, by
 
     |C (s I - A)^-1| (dA |x| + dB) + |F + s G| (dX |x| + dU) + eps (|C| |x| + |D|),    x = (s I - A)^-1 B.      (29a)
 
-It takes a tenth of the time of a measurement, which ordinary models are spared; where it is no small part of the value,
-that says nothing.
+The bound takes a tenth of the time of a measurement, which ordinary models are spared; where it is no small part of
+the value, that says nothing.
 """
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, as_dense, has_even_entries, is_zero, powers_of_two
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
 from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE
 from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 
@@ -21,6 +22,55 @@ BOUNDED_AT = 8  #: modes, spread over all, at which it is worked out
 BETWEEN = 4  #: frequencies between a decade below the slowest one and the fastest one, at which it is too
 NO_LOSS = 1e-10  #: of the value: up to that a bound says that nothing is lost
 SHALLOW_VALUE = 1e-3  #: of what a channel is at lower frequencies: below, it is relative to that
+POWER_OF_TWO = 0.5  #: mantissa of a factor that rounds nothing
+EVEN_STATES = 1e3  #: condition number of A, balanced, and share of what cancels, up to which few states lose nothing
+
+
+def is_well_conditioned(A: FloatArray) -> bool:
+    """Return whether the condition number of A is below a thousand, so that solving with it loses three digits at most.
+
+    Examples
+    --------
+    >>> [is_well_conditioned(np.diag([1.0, part])) for part in (0.1, 1e-6)]
+    [True, False]
+    """
+    return not len(A) or EVEN_STATES * lu_and_rcond(A)[2] >= 1.0
+
+
+def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: bool) -> bool:
+    """Tell at once whether few states, of a plainly regular W, lose nothing that is worth a look.
+
+    A is well conditioned, as it stands (`even`) or once its states are of one size and if no entry of M, C and K of few
+    DOFs is tiny beside the others of its matrix; what static DOFs have of the states and of the inputs does not cancel,
+    nor do accelerations towards rest.
+
+    Examples
+    --------
+    A mass on a spring, and one of which nearly nothing is left:
+
+    >>> from halfdof_ctrl import exact_reduction, mechss
+    >>> [loses_nothing(model, exact_reduction(model).solution.equations, even=False)
+    ...  for model in (mechss([[1]], [[0.1]], [[4]]), mechss([[1e-9]], [[0.1]], [[4]]))]
+    [True, False]
+    """
+    A, q = equations.A, equations.displacement
+    scale: FloatArray | float = 1.0
+    if _mixes_accelerations(model):
+        return False
+    if not len(A) or equations.shift:
+        return not len(A)
+    if not even:
+        if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part) for part in model.quadratics.P):
+            return False
+        A, factors = balanced_states(A)
+        scale = factors[:, None]
+        if not is_well_conditioned(A):
+            return False
+    plain = not any(part.any() for part in (*model.quadratics.F[1:], *model.quadratics.D))
+    if not q.U and plain:
+        return True
+    x = np.asarray(scale * np.linalg.solve(A, equations.B / scale))
+    return _is_kept(q, x) and (plain or _are_seen(model, equations, x))
 
 
 def is_bounded(model: SecondOrderModel, equations: StateEquations, output: Signal, errors: StateEquations) -> bool:
@@ -86,3 +136,34 @@ def _points(A: FloatArray) -> ComplexArray:
     modes = size[np.unique(np.linspace(0.0, 1.0, BOUNDED_AT) ** 2 * (size.size - 1) // 1).astype(np.intp)]
     between = np.geomspace(BELOW_ALL * size[0], size[-1], BETWEEN)
     return np.asarray(1j * BESIDE_MODE * np.sort(np.append(modes, between)))
+
+
+def _is_kept(q: Signal, x: FloatArray) -> bool:
+    """Return whether displacements at rest, -x times inputs, are no small differences of their parts."""
+    if not q.U:
+        return True
+    terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
+    left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
+    return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
+
+
+def _are_seen(model: SecondOrderModel, equations: StateEquations, x: FloatArray) -> bool:
+    """Return whether outputs that mix displacements with others are no small differences of their parts at rest."""
+    F, D = model.quadratics.F, np.asarray(model.quadratics.D[0])
+    terms, left = np.abs(D), D
+    for k, part in enumerate(F):
+        motion = equations.motion(k)
+        direct = motion.U[0] if motion.U else np.zeros((len(motion.X), x.shape[1]))
+        terms = terms + np.abs(part) @ (np.abs(motion.X) @ np.abs(x) + np.abs(direct))
+        left = left + F[0] @ (direct - motion.X @ x) if k == 0 else left
+    mixed = np.asarray(F[0].any(axis=1))[:, None] | (D != 0.0)
+    return bool((~mixed | (terms <= EVEN_STATES * np.abs(left))).all())
+
+
+def _mixes_accelerations(model: SecondOrderModel) -> bool:
+    """Return whether an output is more than one acceleration, or has a factor that rounds a row of A."""
+    if is_zero(model.H):
+        return False
+    H = as_dense(model.H)
+    size = np.abs(H)
+    return bool((np.count_nonzero(H, axis=1) > 1).any() or (size * powers_of_two(size) != POWER_OF_TWO)[H != 0.0].any())

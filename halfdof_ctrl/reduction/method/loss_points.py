@@ -9,6 +9,7 @@ nothing of where the model is looked at.
 import sys
 from collections.abc import Sequence
 from itertools import combinations, pairwise
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg
@@ -34,6 +35,7 @@ ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 TOWARDS_REST = (1e-12, 1e-8, 1e-4, 0.1)  #: of the slowest frequency of a model of few DOFs without free motions
 DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
+NEAR_ORIGIN = 1e-3  #: of the slowest frequency: a slower pole may be one at the origin that rounding has moved
 SAME_SPEED = 4.0  #: ratio of two frequencies of signals of which one is enough
 MOST_OF_SIGNALS = 8  #: frequencies of signals that are looked at, spread over all
 DECADE = 10.0  #: ratio of neighbouring frequencies at most, as far as ...
@@ -80,8 +82,15 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     )
 
 
-def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> tuple[ComplexArray, float]:
-    """Choose points for a model of few DOFs, and return the lowest frequency at which it moves too.
+class Slow(NamedTuple):
+    """Frequencies [rad/s] below which little is looked at."""
+
+    least: float  #: of what moves and where signals change their kind
+    typical: float  #: of what moves
+
+
+def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> tuple[ComplexArray, Slow]:
+    """Choose points for a model of few DOFs, and say which are slow for it.
 
     Parameters
     ----------
@@ -93,11 +102,13 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     speeds, slow = typical_speeds(model), np.abs(loss_points(A)) if len(A) else np.zeros(0)
     own = np.concatenate([slow[slow > SLOWEST_SPEED * min(speeds)], np.outer(speeds, TYPICAL_SPEEDS).ravel()])
     corners = _apart(np.asarray(signals))
-    free = free_motion_count(model.M, model.C, model.K)
     chosen = np.unique(np.concatenate([own, [slowest_speed(model) * BESIDE_MODE], corners]))
-    if free is not None:
-        chosen = chosen[chosen >= min(_end_of_drift(A, free.poles, corners), chosen[-1])]
-    rest = chosen[0] * np.array(TOWARDS_REST if free is None else ())
+    sizes, free = np.sort(np.abs(np.linalg.eigvals(A))), free_motion_count(model.M, model.C, model.K)
+    at_origin = int(np.count_nonzero(sizes < SLOWEST_SPEED * min(speeds))) if free is None else free.poles
+    if at_origin:
+        chosen = chosen[chosen >= min(_end_of_drift(sizes[:at_origin], sizes[at_origin:], corners), chosen[-1])]
+    still = at_origin > 0 or float(sizes.min(initial=np.inf)) < NEAR_ORIGIN * chosen[0]
+    rest = chosen[0] * np.array(() if still else TOWARDS_REST)
     step = max(DECADE, float(chosen[-1] / chosen[0]) ** (1.0 / MOST_BETWEEN))
     between = [
         low * (high / low) ** (np.arange(1, count) / count)
@@ -106,7 +117,7 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     ]
     mantissa, exponent = np.frexp(np.concatenate([rest, chosen, *between]))
     every = np.unique(np.ldexp(np.rint(np.ldexp(mantissa, FEW_BITS)), exponent - FEW_BITS))
-    return np.asarray(1j * every), float(every[len(rest)])
+    return np.asarray(1j * every), Slow(float(every[len(rest)]), float(own.min()))
 
 
 def typical_speeds(model: SecondOrderModel) -> list[float]:
@@ -151,14 +162,12 @@ def _apart(speeds: FloatArray) -> FloatArray:
     return np.asarray(SAME_SPEED ** logs[places])
 
 
-def _end_of_drift(A: FloatArray, free: int, corners: FloatArray) -> float:
+def _end_of_drift(moved: FloatArray, others: FloatArray, corners: FloatArray) -> float:
     """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
 
     A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2. That
-    is no excuse where other poles are, nor, if there are none, where equations or signals change their kind.
+    is no excuse where other poles are, nor, if there are none, where signals change their kind.
     """
-    sizes = np.sort(np.abs(np.linalg.eigvals(A)))
-    moved, others = sizes[:free], sizes[free:] if sizes.size > free else corners
     twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
     end = float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=sys.float_info.min))
-    return min(end, TYPICAL_SPEEDS[0] * float(others.min(initial=np.inf)))
+    return min(end, TYPICAL_SPEEDS[0] * float((others if others.size else corners).min(initial=np.inf)))

@@ -78,7 +78,7 @@ def test_the_warning_names_the_channel_the_size_and_the_cause() -> None:
     """Two DOFs that move together but for a mass of 3e-9: W looks sound, what follows from it is not."""
     generator = np.random.default_rng([65, 2])
     model = signals(generator, nearly_singular(generator, assembly(generator, 2)))
-    said = r"lose \d\.\de-\d\d of y\[\d\] from u\[\d\] at .* far faster than others"
+    said = r"lose \d\.\de[+-]\d\d of y\[\d\] from u\[\d\] at .* far faster than others"
     with pytest.warns(LostDigitsWarning, match=said):
         exact_reduction(model)
 
