@@ -56,7 +56,7 @@ from halfdof_ctrl.reduction.method.signals import Signal
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
-STAYS = 4.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
+STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 AT_CORNER = 1.5  #: power of s by which a channel may rise or fall below what moves, where signals change their kind
 STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
@@ -347,11 +347,10 @@ class _Comparison:
 
 
 def _speeds_of_signals(motion: Equations) -> list[float]:
-    """Return where inputs, outputs and what passes directly change their kind."""
-    into = [np.abs(part).max(axis=0, initial=0.0) for part in motion.B]
-    out = [np.abs(as_dense(part)).max(axis=1, initial=0.0) for part in motion.C]
-    direct = [np.abs(part).ravel() for part in motion.D]
-    return [speed for signals in (into, out, direct) for speed in signal_speeds(signals)]
+    """Return where inputs, outputs and what passes directly change their kind, entry by entry."""
+    return [
+        speed for parts in (motion.B, motion.C, motion.D) for speed in signal_speeds([as_dense(part) for part in parts])
+    ]
 
 
 def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:

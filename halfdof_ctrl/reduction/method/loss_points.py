@@ -34,8 +34,10 @@ TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as w
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 TOWARDS_REST = (1e-12, 1e-8, 1e-4, 0.1)  #: of the slowest frequency of a model of few DOFs without free motions
+TOWARDS_FREE = 0.2  #: of the slowest other frequency of one with free motions, or, if the next is less, ...
 DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
 NEAR_ORIGIN = 1e-3  #: of the slowest frequency: a slower pole may be one at the origin that rounding has moved
+BESIDE_CORNER = 1.2  #: times the frequency at which terms of a signal are of one size, for they may cancel there
 SAME_SPEED = 4.0  #: ratio of two frequencies of signals of which one is enough
 MOST_OF_SIGNALS = 8  #: frequencies of signals that are looked at, spread over all
 DECADE = 10.0  #: ratio of neighbouring frequencies at most, as far as ...
@@ -106,7 +108,10 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     sizes, free = np.sort(np.abs(np.linalg.eigvals(A))), free_motion_count(model.M, model.C, model.K)
     at_origin = int(np.count_nonzero(sizes < SLOWEST_SPEED * min(speeds))) if free is None else free.poles
     if at_origin:
-        chosen = chosen[chosen >= min(_end_of_drift(sizes[:at_origin], sizes[at_origin:], corners), chosen[-1])]
+        others = next(part for part in (sizes[at_origin:], corners, own) if part.size)
+        least = min(_end_of_drift(sizes[:at_origin]), TOWARDS_FREE * float(others.min()))
+        chosen = np.append(chosen[chosen > least], max(least, TOWARDS_FREE * chosen[0]))
+        chosen.sort()
     still = at_origin > 0 or float(sizes.min(initial=np.inf)) < NEAR_ORIGIN * chosen[0]
     rest = chosen[0] * np.array(() if still else TOWARDS_REST)
     step = max(DECADE, float(chosen[-1] / chosen[0]) ** (1.0 / MOST_BETWEEN))
@@ -134,24 +139,21 @@ def typical_speeds(model: SecondOrderModel) -> list[float]:
 
 
 def signal_speeds(coefficients: Sequence[FloatArray]) -> list[float]:
-    """Return the frequencies at which parts ``X_j s^j`` and ``X_k s^k`` of some signals are of one size.
+    """Return the frequencies at which two entries of ``X_0 + X_1 s + X_2 s^2`` in one place are of one size.
 
-    Parameters
-    ----------
-    coefficients : sequence of (k,) ndarrays
-        How large each part of each of k signals is.
+    What stands in one place is measured in one unit, so that these do not depend on units.
 
     Examples
     --------
-    A displacement and an acceleration that is weighted with 1e-4 s^2:
+    A displacement and its acceleration, weighted with 1e-4 s^2:
 
-    >>> signal_speeds([np.array([1.0]), np.array([0.0]), np.array([1e-4])])
+    >>> signal_speeds([np.array([[1.0, 2.0]]), np.array([[0.0, 0.0]]), np.array([[1e-4, 0.0]])])
     [100.0]
     """
     found: list[float] = []
     for (j, low), (k, high) in combinations(enumerate(coefficients), 2):
-        both = (low > 0.0) & (high > 0.0)
-        found += ((low[both] / high[both]) ** (1.0 / (k - j))).tolist()
+        both = (low != 0.0) & (high != 0.0)
+        found += (np.abs(low[both] / high[both]) ** (1.0 / (k - j))).tolist()
     return found
 
 
@@ -159,15 +161,13 @@ def _apart(speeds: FloatArray) -> FloatArray:
     """Return some frequencies that differ."""
     logs = np.unique(np.rint(np.log(speeds) / np.log(SAME_SPEED)))
     places = np.unique(np.linspace(0, logs.size - 1, min(logs.size, MOST_OF_SIGNALS)).astype(np.intp))
-    return np.asarray(SAME_SPEED ** logs[places])
+    return np.asarray(BESIDE_CORNER * SAME_SPEED ** logs[places])
 
 
-def _end_of_drift(moved: FloatArray, others: FloatArray, corners: FloatArray) -> float:
+def _end_of_drift(moved: FloatArray) -> float:
     """Return from which frequency on it is nothing that rounding has moved the poles of free motions from the origin.
 
-    A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2. That
-    is no excuse where other poles are, nor, if there are none, where signals change their kind.
+    A pole p that should be at 0 changes the value at s by p / s of itself, two that should be there by (p / s)^2.
     """
     twice = (np.abs(moved[:, None] - moved) <= moved / 2.0).sum(axis=1) > 1
-    end = float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=sys.float_info.min))
-    return min(end, TYPICAL_SPEEDS[0] * float((others if others.size else corners).min(initial=np.inf)))
+    return float((moved / np.where(twice, np.sqrt(DRIFT), DRIFT)).max(initial=sys.float_info.min))
