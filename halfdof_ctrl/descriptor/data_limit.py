@@ -32,7 +32,7 @@ def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     coefficients = model.quadratics
     values, growth = transfer_and_growth(*coefficients, points)
-    suspect = np.flatnonzero((growth > SUSPECT_GROWTH * EPS / model.known_to) & np.isfinite(growth))
+    suspect = np.flatnonzero(growth > SUSPECT_GROWTH * EPS / model.known_to)
     if suspect.size:
         limit = data_limit(*coefficients, points[suspect]).of_entries_known_to(model.known_to)
         warn_of_data(model, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)

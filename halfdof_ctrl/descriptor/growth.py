@@ -17,7 +17,7 @@ from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.base.errors import UncertainRankError
 from halfdof_ctrl.descriptor.exact_counts import exact_counts
 from halfdof_ctrl.descriptor.first_order import time_scale
-from halfdof_ctrl.model.evaluation import quadratic_rounding, quadratic_transfer
+from halfdof_ctrl.model.evaluation import data_limit, quadratic_transfer
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 IntArray = npt.NDArray[np.int64]
@@ -114,7 +114,7 @@ def _by_circle(
     coefficients = model.quadratics
     with np.errstate(invalid="ignore"):
         parts = np.abs(np.fft.fft(quadratic_transfer(*coefficients, points), axis=2) / count)[:, :, 1 : most + 1]
-    rounding = quadratic_rounding(*coefficients, points).max(axis=2, keepdims=True)
+    rounding = data_limit(*coefficients, points).data.max(axis=2, keepdims=True)
     powers = np.arange(1, most + 1)
     possible = powers <= bound[:, :, None]
     present = possible & ~(parts <= ROUNDED * rounding)

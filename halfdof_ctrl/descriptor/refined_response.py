@@ -15,16 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, powers_of_two
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
 from halfdof_ctrl.descriptor.matrix_polynomial import MatrixPolynomial
 from halfdof_ctrl.model.quadratics import Coefficients
-from halfdof_ctrl.model.refinement import REFINED_ENOUGH
+from halfdof_ctrl.model.refinement import ENOUGH_FOR_DATA, REFINED_ENOUGH
+from halfdof_ctrl.model.weak_directions import Factors, refined_along_weak, refined_at
 
 FACTORS_HELD = 2**20  #: complex entries of factors held at a time (16 MB)
 MOST_ROUNDS = 4  #: of refinement; two are enough but where P(s) is nearly singular
+SMALL_STEP = REFINED_ENOUGH**0.5  #: a correction below this part of the largest unknown is the last but for rounding
+NO_FACTORS = Factors(lambda right: right, lambda right: right, np.zeros((0, 1)), np.zeros((0, 1)))  #: of no unknowns
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,24 +75,15 @@ def refined_response(
 
 @dataclass(slots=True, eq=False)
 class _Point:
-    """P(s), scaled by powers of two and factorized, and what it is solved for."""
+    """P(s), factorized, and what it is solved for."""
 
     place: int
     s: complex
     inputs: IndexArray  #: columns of B
-    rows: FloatArray
-    columns: FloatArray
-    lu: ComplexArray
-    pivots: FloatArray
+    factors: Factors
     right: ComplexArray
     x: ComplexArray
-
-    def solve(self, right: ComplexArray) -> ComplexArray:
-        return np.asarray(zgetrs(self.lu, self.pivots, right * self.rows[:, None])[0] * self.columns[:, None])
-
-    def solve_transposed(self, right: ComplexArray) -> ComplexArray:
-        solved = zgetrs(self.lu, self.pivots, right * self.columns[:, None], trans=1)[0]
-        return np.asarray(solved * self.rows[:, None])
+    is_coarse: bool  #: whether the factors give not even a few digits
 
 
 class ResponseEvaluator:
@@ -113,6 +106,8 @@ class ResponseEvaluator:
         self.P, self.B, self.F, self.D = (MatrixPolynomial(parts) for parts in (P, B, F, D))
         self.touched = MatrixPolynomial([0.0 * part if k in exact_powers else part for k, part in enumerate(P)])
         self.exact = ExactPolynomial([as_it_is(part) for part in P])
+        self.coefficients = P
+        self.transposed: ExactPolynomial | None = None  #: made when it is needed
         self.points, self.sizes = points, sizes
 
     def response(self, *, refined: bool = True, advance: Callable[[int], None] = lambda _: None) -> RefinedResponse:
@@ -145,7 +140,7 @@ class ResponseEvaluator:
             chosen = places[start : start + held].tolist()
             with np.errstate(all="ignore"):
                 tried = [self._factorized(place, np.flatnonzero(wanted[:, place])) for place in chosen]
-                solved = [point for point in tried if point is not None]
+                solved = [point for point in tried if point is not None and (refined or not point.factors.is_nudged)]
                 if refined:
                     self._refine(solved)
                 for point in solved:
@@ -155,29 +150,18 @@ class ResponseEvaluator:
     def _factorized(self, place: int, inputs: IndexArray) -> _Point | None:
         s = complex(self.points[place])
         matrix, right = self.P.at(s), self.B.at(s)[:, inputs]
-        if not len(matrix):
-            empty = np.zeros(0)
-            return _Point(place, s, inputs, empty, empty, matrix, empty, right, right)
-        size = np.abs(matrix)
-        rows = powers_of_two(size.max(axis=1))
-        size *= rows[:, None]
-        columns = powers_of_two(size.max(axis=0))
-        matrix *= rows[:, None]
-        matrix *= columns
-        lu, pivots, info = zgetrf(matrix, overwrite_a=True)
-        if info != 0:
+        factors = Factors.of_dense(matrix) if len(matrix) else NO_FACTORS
+        if factors is None:
             return None
-        point = _Point(place, s, inputs, rows, columns, lu, pivots, right, right)
-        point.x = point.solve(right)
-        return point
+        return _Point(place, s, inputs, factors, right, factors.solve(right), is_coarse=factors.is_nudged)
 
     def _refine(self, solved: Sequence[_Point]) -> None:
-        """Refine the solutions of all points until corrections are small or no longer shrink."""
+        """Refine the solutions of all points until corrections are small; along weak directions where they do not."""
         last = {point.place: np.inf for point in solved}
         left = [point for point in solved if point.x.size]
         for _ in range(MOST_ROUNDS):
             if not left:
-                return
+                break
             counts = [point.inputs.size for point in left]
             residual = self.exact.residual(
                 np.repeat([point.s for point in left], counts),
@@ -186,22 +170,38 @@ class ResponseEvaluator:
             )
             further = []
             for point, part in zip(left, np.split(residual, np.cumsum(counts)[:-1], axis=1), strict=True):
-                correction = point.solve(part)
+                correction = point.factors.solve(part)
                 share = _share(correction, point.x)
+                point.is_coarse |= not share <= ENOUGH_FOR_DATA and not np.isfinite(last[point.place])
                 if not share < min(1.0, last[point.place]):
                     continue
                 point.x = point.x + correction
                 last[point.place] = share
-                if share > REFINED_ENOUGH**0.5:  # errors shrink by the same factor once more
+                if share > SMALL_STEP:  # errors shrink by the same factor once more
                     further.append(point)
             left = further
+        for point in solved:
+            if point.x.size and (point.factors.is_nudged or last[point.place] > SMALL_STEP):
+                found = refined_along_weak(self.exact, point.s, point.x, point.right, point.factors)
+                is_lost = found.is_singular or (point.factors.is_nudged and not found.is_settled)
+                point.x = np.full_like(point.x, np.nan) if is_lost else found.solution
+
+    def _adjoint(self, point: _Point, output: ComplexArray) -> ComplexArray:
+        """Solve ``P^T y = F^T`` to a few digits."""
+        right = np.asarray(output.T + 0j)
+        y = point.factors.solve_transposed(right)
+        if not point.is_coarse:
+            return y
+        if self.transposed is None:
+            self.transposed = ExactPolynomial([as_it_is(part.T) for part in self.coefficients])
+        return refined_at(self.transposed, point.s, y, right, point.factors.transposed, enough=ENOUGH_FOR_DATA).solution
 
     def _finish(self, found: RefinedResponse, point: _Point) -> None:
         s, x, inputs = point.s, point.x, point.inputs
         output = self.F.at(s)
-        y = point.solve_transposed(output.T).T if x.size or len(point.rows) else output
+        y = self._adjoint(point, output).T if len(x) else output
         found.values[:, inputs, point.place] = self.F.times(s, x) + self.D.at(s)[:, inputs]
-        (sx, most), (sy, _) = _sizes(x, point.columns), _sizes(y.T, point.rows)
+        (sx, most), (sy, _) = _sizes(x, point.factors.across), _sizes(y.T, point.factors.down)
         terms = self.B.size_at(s)[:, inputs] + self.touched.size_times(s, sx)
         data = sy.T @ terms + self.F.size_times(s, sx) + self.D.size_at(s)[:, inputs]
         found.data[:, inputs, point.place] = EPS * data
@@ -225,5 +225,5 @@ def _sizes(x: ComplexArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
     One that should be zero is only as small as rounding lets it be.
     """
     size = np.abs(x)
-    most = (size / scale[:, None]).max(axis=0, initial=0.0) * scale[:, None]
+    most = (size / scale).max(axis=0, initial=0.0) * scale
     return size + EPS * most, most

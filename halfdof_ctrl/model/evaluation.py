@@ -9,7 +9,6 @@ the working precision (`exact_products`).
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg.lapack import zgetrf, zgetrs
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, powers_of_two
 from halfdof_ctrl.base.doors import require_switch, shown
@@ -18,8 +17,16 @@ from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE
 from halfdof_ctrl.model.quadratics import Coefficients
-from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, random_right_side, refined
+from halfdof_ctrl.model.refinement import (
+    COARSE_GROWTH,
+    ENOUGH_FOR_DATA,
+    REFINED_ENOUGH,
+    SUSPECT_GROWTH,
+    DataLimit,
+    random_right_side,
+)
 from halfdof_ctrl.model.sparse_evaluation import sparse_transfer
+from halfdof_ctrl.model.weak_directions import Factors, refined_at
 
 BATCH_ENTRIES = 2**21  #: complex entries of P(s) held at a time (32 MB)
 
@@ -59,15 +66,10 @@ def transfer_and_growth(
     """
     values, growth = np.empty((*D[0].shape, points.size), dtype=np.complex128), np.zeros(points.size)
     batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
-    exact: ExactPolynomial | None = None
     for start in range(0, points.size, batch):
         part = points[start : start + batch]
         with np.errstate(invalid="ignore", over="ignore"):
-            right = _polynomial(B, part)
-            states, growth[start : start + batch] = _solved(_polynomial(P, part), right)
-            for k in np.flatnonzero(growth[start : start + batch] > SUSPECT_GROWTH).tolist():
-                exact = ExactPolynomial(P) if exact is None else exact
-                states[k] = _refined(P, exact, complex(part[k]), states[k], right[k])
+            states, growth[start : start + batch] = _states(P, part, _polynomial(B, part), SUSPECT_GROWTH)
             response = _polynomial(F, part) @ states + _polynomial(D, part)
         response[~np.isfinite(states).all(axis=(1, 2))] = complex(np.inf, np.nan)
         values[:, :, start : start + batch] = np.moveaxis(response, 0, 2)
@@ -75,87 +77,76 @@ def transfer_and_growth(
 
 
 def data_limit(P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray) -> DataLimit:
-    """Return (DATA) and the slope ``|s dH/ds|`` of dense models at every point, (p, m, k)."""
-    data = quadratic_rounding(P, B, F, D, points)
-    slope = np.empty(data.shape)
-    batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
-    for start in range(0, points.size, batch):
-        part = points[start : start + batch]
-        matrix, output = _polynomial(P, part), _polynomial(F, part)
-        dP, dB, dF, dD = (_polynomial([X[1], 2.0 * X[2]], part) for X in (P, B, F, D))
-        with np.errstate(invalid="ignore", over="ignore"):
-            x = _solved(matrix, _polynomial(B, part))[0]
-            y = np.swapaxes(_solved(np.swapaxes(matrix, 1, 2), np.swapaxes(output, 1, 2))[0], 1, 2)
-            change = dF @ x + y @ (dB - dP @ x) + dD
-        slope[:, :, start : start + batch] = np.abs(np.moveaxis(change, 0, 2) * part)
-    return DataLimit(data, slope)
+    """Return (DATA) and the slope ``|s dH/ds|`` of dense models at every point, (p, m, k).
 
-
-def _refined(
-    P: Coefficients, exact: ExactPolynomial, s: complex, states: ComplexArray, right: ComplexArray
-) -> ComplexArray:
-    """Refine the solution at one point by residuals that are exact but for one rounding."""
-    if not np.isfinite(states).all():
-        return states
-    matrix = _polynomial(P, np.array([s]))
-    rows, columns = _scaling_powers(matrix)
-    lu, pivots, info = zgetrf((matrix * rows * columns)[0])
-    if info != 0:
-        return states
-
-    def solve(residual: ComplexArray) -> ComplexArray:
-        return np.asarray(zgetrs(lu, pivots, residual * rows[0])[0] * columns[0].T)
-
-    return refined(exact, s, states, right, solve)
-
-
-def quadratic_rounding(
-    P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray
-) -> FloatArray:
-    """Bound, in first order, what relative errors of eps in every coefficient change at every point.
-
-    With x and y the solutions for input and output, ``P x = B`` and ``y P = F``, that is
-    ``eps (|y| (|P| |x| + |B|) + |F| |x| + |D|)``, where ``|P| = |P_0| + |s| |P_1| + |s|^2 |P_2|`` and so on. The
-    solution of `quadratic_transfer` is about as accurate.
-
-    Parameters
-    ----------
-    P, B, F, D, points
-        As in `quadratic_transfer`.
-
-    Returns
-    -------
-    (p, m, k) ndarray
-        Infinite where ``P(s)`` is exactly singular.
+    With x and y the solutions for input and output, ``P x = B`` and ``y P = F``, (DATA) is what relative errors of eps
+    in every coefficient change in first order, ``eps (|y| (|P| |x| + |B|) + |F| |x| + |D|)``, where
+    ``|P| = |P_0| + |s| |P_1| + |s|^2 |P_2|`` and so on. Infinite where ``P(s)`` is exactly singular.
 
     Examples
     --------
     A spring of 4 N/m under 2 N gives 0.5 m, to which force and stiffness contribute one eps each:
 
     >>> one, four, two, zero = (np.array([[value]]) for value in (1.0, 4.0, 2.0, 0.0))
-    >>> bound = quadratic_rounding([four], [two], [one], [zero], np.array([0j]))
-    >>> bool(np.isclose(bound[0, 0, 0], 1.5 * np.finfo(float).eps))
+    >>> none = [zero, zero]
+    >>> limit = data_limit([four, *none], [two, *none], [one, *none], [zero, *none], np.array([0j]))
+    >>> bool(np.isclose(limit.data[0, 0, 0], 1.5 * np.finfo(float).eps))
     True
     """
-    bounds = np.empty((*D[0].shape, points.size))
-    batch = max(1, BATCH_ENTRIES // P[0].size)
+    data, slope = np.empty((2, *D[0].shape, points.size))
+    batch = max(1, BATCH_ENTRIES // max(1, P[0].size))
+    transposed = [part.T for part in P]
     for start in range(0, points.size, batch):
-        part = points[start : start + batch]
-        matrix, output = _polynomial(P, part), _polynomial(F, part)
-        size_P, size_B, size_F, size_D = (_sizes(coefficients, part) for coefficients in (P, B, F, D))
+        place = slice(start, start + batch)
+        part = points[place]
+        output = _polynomial(F, part)
+        sizes_P, sizes_B, sizes_F, sizes_D = (_sizes(coefficients, part) for coefficients in (P, B, F, D))
+        dP, dB, dF, dD = (_polynomial([X[1], 2.0 * X[2]], part) for X in (P, B, F, D))
         with np.errstate(invalid="ignore", over="ignore"):
-            x = _solution_size(matrix, _polynomial(B, part))
-            y = np.swapaxes(_solution_size(np.swapaxes(matrix, 1, 2), np.swapaxes(output, 1, 2)), 1, 2)
-            bound = y @ (size_P @ x + size_B) + size_F @ x + size_D
-        bounds[:, :, start : start + batch] = np.moveaxis(np.nan_to_num(bound, nan=np.inf), 0, 2)
-    return np.asarray(EPS * bounds)
+            x = _states(P, part, _polynomial(B, part), COARSE_GROWTH, ENOUGH_FOR_DATA)[0]
+            y = _states(transposed, part, np.swapaxes(output, 1, 2), COARSE_GROWTH, ENOUGH_FOR_DATA)[0]
+            y = np.swapaxes(y, 1, 2)
+            scale = _scaling_powers(_polynomial(P, part))
+            (sx, sy) = _size(x, scale[1]), np.swapaxes(_size(np.swapaxes(y, 1, 2), scale[0]), 1, 2)
+            bound = sy @ (sizes_P @ sx + sizes_B) + sizes_F @ sx + sizes_D
+            change = dF @ x + y @ (dB - dP @ x) + dD
+        data[:, :, place] = EPS * np.moveaxis(np.nan_to_num(bound, nan=np.inf), 0, 2)
+        slope[:, :, place] = np.abs(np.moveaxis(change, 0, 2) * part)
+    return DataLimit(data, slope)
 
 
-def _solution_size(P: ComplexArray, B: ComplexArray) -> FloatArray:
+def _states(
+    P: Coefficients, points: ComplexArray, right: ComplexArray, refined_above: float, enough: float = REFINED_ENOUGH
+) -> tuple[ComplexArray, FloatArray]:
+    """Solve ``P(s) x = b`` at some points, refined where P(s) is nearly singular; give the growth too."""
+    states, growth = _solved(_polynomial(P, points), right)
+    suspect = np.flatnonzero(growth > refined_above)
+    if suspect.size:
+        exact = ExactPolynomial(P)
+        for k in suspect.tolist():
+            states[k] = _refined(P, exact, complex(points[k]), states[k], right[k], enough)
+    return states, growth
+
+
+def _refined(
+    P: Coefficients, exact: ExactPolynomial, s: complex, states: ComplexArray, right: ComplexArray, enough: float
+) -> ComplexArray:
+    """Refine the solution at one point by residuals that are exact but for one rounding."""
+    factors = Factors.of_dense(_polynomial(P, np.array([s]))[0])
+    if factors is None:
+        return states
+    is_known = bool(np.isfinite(states).all())
+    found = refined_at(exact, s, states if is_known else factors.solve(right), right, factors, enough=enough)
+    if found.is_settled or (is_known and not found.is_singular):
+        return found.solution
+    return np.full(right.shape, complex(np.inf, np.nan))
+
+
+def _size(x: ComplexArray, scale: FloatArray) -> FloatArray:
     """Return the sizes of the unknowns; one that should be zero is only as small as rounding lets it be."""
-    columns = _scaling_powers(P)[1]
-    size = np.abs(_solved(P, B)[0]) / np.swapaxes(columns, 1, 2)
-    return np.asarray((size + EPS * size.max(axis=1, keepdims=True)) * np.swapaxes(columns, 1, 2))
+    across = scale.reshape(len(x), -1, 1)
+    size = np.abs(x) / across
+    return np.asarray((size + EPS * size.max(axis=1, keepdims=True, initial=0.0)) * across)
 
 
 def _sizes(coefficients: Coefficients, points: ComplexArray) -> FloatArray:

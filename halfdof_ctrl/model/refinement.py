@@ -10,14 +10,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 
 REFINEMENT_ROUNDS = 8  #: of refinement at most
 SUSPECT_GROWTH = 1e5  #: growth of a random solution above which the sum of the terms may have lost digits that matter
+COARSE_GROWTH = 1e-3 / EPS  #: the same, above which a solution that is not refined lacks the digits (DATA) asks for
 REFINED_ENOUGH = 4 * EPS  #: a correction below this part of the largest unknown is the last
-SHRINKS = 0.7  #: corrections that do not shrink by this factor lead nowhere: P(s) is singular to rounding
+ENOUGH_FOR_DATA = 1e-3  #: the same where three digits are enough
+SETTLED = 1e-12  #: a solution whose corrections stay above this part of it is not found by the factors
+SHRINKS = 0.1  #: corrections that do not shrink by this factor lead nowhere soon: P(s) is singular to rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +47,9 @@ def refined(
     solution: ComplexArray,
     right: ComplexArray,
     solve: Callable[[ComplexArray], ComplexArray],
-) -> ComplexArray:
+    *,
+    enough: float = REFINED_ENOUGH,
+) -> tuple[ComplexArray, npt.NDArray[np.bool_]]:
     """Refine each column until its corrections no longer shrink.
 
     Parameters
@@ -57,23 +63,29 @@ def refined(
     right : (n, m) complex ndarray
     solve : callable
         Takes residuals to corrections, by factors of the rounded sum of the terms.
+    enough : float
+        A correction below this part of the largest unknown is the last.
 
     Returns
     -------
     (n, m) complex ndarray
         The first solution where corrections do not shrink, or are larger than itself: more wrong than right.
+    (m,) bool ndarray
+        Whether corrections became so small that this is the solution.
     """
     best, last = solution.copy(), np.ones(solution.shape[1]) / SHRINKS
+    smallest = np.full(last.shape, np.inf)
     for _ in range(REFINEMENT_ROUNDS):
         correction = solve(exact.residual(s, best, right))
         size = np.abs(best).max(axis=0, initial=0.0)
         share = np.abs(correction).max(axis=0, initial=0.0) / np.where(size > 0.0, size, 1.0)
+        smallest = np.fmin(smallest, share)
         better = share <= SHRINKS * last
         best[:, better] += correction[:, better]
-        last = np.where(better & (share > REFINED_ENOUGH), share, 0.0)
+        last = np.where(better & (share > enough), share, 0.0)
         if not last.any():
             break
-    return best
+    return best, smallest <= max(SETTLED, enough)
 
 
 def random_right_side(size: int) -> FloatArray:

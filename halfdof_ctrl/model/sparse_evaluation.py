@@ -15,7 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import SuperLU
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, powers_of_two
@@ -27,7 +27,8 @@ from halfdof_ctrl.base.sparse_factors import COLUMNS_AT_A_TIME, CORRECTED_ABOVE,
 from halfdof_ctrl.base.sparse_products import times
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.quadratics import Coefficients
-from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit, refined
+from halfdof_ctrl.model.refinement import COARSE_GROWTH, ENOUGH_FOR_DATA, REFINED_ENOUGH, SUSPECT_GROWTH, DataLimit
+from halfdof_ctrl.model.weak_directions import Factors, WeakDirections, nudge, refined_at
 
 MOST_BOUNDED = 32  #: outputs (of a model with more outputs than inputs), or inputs, whose bounds are found at a point
 MOST_VALUES = 2**27  #: complex entries of a response, all channels and points (2 GB)
@@ -108,6 +109,8 @@ class SparseTransfer:
         self._limit = DataLimit.none(self.D[0].shape)
         self.square = square
         self.exact: ExactPolynomial | None = None  #: made when it is needed
+        self.exact_transposed: ExactPolynomial | None = None  #: likewise
+        self.weak: WeakDirections | None = None  #: found at a point before
 
     def at(self, s: complex) -> ComplexArray:
         """Evaluate at one point [rad/s]: (p, m)."""
@@ -131,30 +134,52 @@ class SparseTransfer:
         """Return ``F P(s)^-1 B`` and the componentwise backward error of the solution."""
         factors = self._factorized(s, way)
         growth = factors.growth()
-        self.growth = max(self.growth, growth)
+        self.growth = max(self.growth, np.inf if factors.is_nudged else growth)
+        refines = factors.is_nudged or growth > SUSPECT_GROWTH
         left = None
-        if growth > SUSPECT_GROWTH:
-            self.exact = ExactPolynomial(self.square) if self.exact is None else self.exact
         if growth > self.bounded_above:
             left = factors.solve_transposed(F[:MOST_BOUNDED].toarray().T)
+            if factors.is_nudged or growth > COARSE_GROWTH:
+                left = self._refined(s, left, F[:MOST_BOUNDED].toarray().T, factors, is_transposed=True)
         product = np.zeros((F.shape[0], B.shape[1]), dtype=np.complex128)
         worst = 0.0
         for start in range(0, B.shape[1], COLUMNS_AT_A_TIME):
             right = B[:, start : start + COLUMNS_AT_A_TIME].toarray()
             solution, backward_error = factors.solve(right)
-            if growth > SUSPECT_GROWTH and self.exact is not None:
-                right = np.asarray(right, dtype=np.complex128)
-                solution = refined(self.exact, s, solution, right, lambda residual: factors.solve(residual)[0])
+            if refines:
+                solution = self._refined(s, solution, right, factors)
             if left is not None:
                 self._bound(s, left, solution, start)
             product[:, start : start + COLUMNS_AT_A_TIME] = times(F, solution)
             worst = max(worst, backward_error)
         return product, worst
 
+    def _refined(
+        self, s: complex, solution: ComplexArray, right: Matrix, factors: "PointFactors", *, is_transposed: bool = False
+    ) -> ComplexArray:
+        """Refine a solution; infinite where P(s) is singular."""
+        if self.exact is None:
+            self.exact = ExactPolynomial(self.square)
+        exact, solver, known, enough = self.exact, factors.both_ways(), self.weak, REFINED_ENOUGH
+        if is_transposed:
+            if self.exact_transposed is None:
+                self.exact_transposed = ExactPolynomial([csc_array(part.T) for part in self.square])
+            exact, solver, enough = self.exact_transposed, solver.transposed, ENOUGH_FOR_DATA
+            known = None if known is None else known.transposed
+        found = refined_at(exact, s, solution, np.asarray(right, dtype=np.complex128), solver, known, enough=enough)
+        if found.directions is not None:
+            self.weak = found.directions.transposed if is_transposed else found.directions
+        if found.is_singular or (factors.is_nudged and not found.is_settled):
+            return np.full(solution.shape, complex(np.inf, np.nan))
+        return found.solution
+
     def _factorized(self, s: complex, way: int) -> "PointFactors":
         """Factorize P(s) in one way, in the order of the first point that was."""
         pencil, (ordering, threshold) = self.pencils[way], self.pivotings[way]
-        factors = PointFactors.of(pencil, s, "NATURAL" if pencil.is_ordered else ordering, threshold)
+        try:
+            factors = PointFactors.of(pencil, s, "NATURAL" if pencil.is_ordered else ordering, threshold)
+        except RuntimeError:  # the rounded sum is singular: P(s) may not be
+            return PointFactors.beside(pencil, s)
         if not pencil.is_ordered:
             order = np.argsort(factors.lu.perm_c)
             self.pencils[way] = pencil.in_order(None if ordering == "COLAMD" else order, order)
@@ -255,6 +280,7 @@ class PointFactors:
     down: FloatArray  #: (n, 1) factors of its rows
     across: FloatArray  #: (n, 1) factors of its columns
     pencil: SparsePencil
+    is_nudged: bool = False  #: whether the rounded sum of the terms is exactly singular: a matrix beside it was factorized
 
     @classmethod
     def of(cls, pencil: SparsePencil, s: complex, ordering: Any, threshold: float) -> "PointFactors":  # noqa: ANN401  # Literal
@@ -266,8 +292,29 @@ class PointFactors:
             It is exactly singular.
         """
         P, down, across = pencil.scaled_at(s)
-        lu = sparse_lu(P, ordering, threshold)
-        return cls(lu, P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
+        return cls(sparse_lu(P, ordering, threshold), P, csc_array(abs(P)), down[:, None], across[:, None], pencil)
+
+    @classmethod
+    def beside(cls, pencil: SparsePencil, s: complex) -> "PointFactors":
+        """Factorize a matrix that differs from P(s), which is exactly singular, by rounding of a diagonal.
+
+        Raises
+        ------
+        RuntimeError
+            That is singular too.
+        """
+        P, down, across = pencil.scaled_at(s)
+        P = csc_array(P + diags_array(nudge(P.shape[0])))
+        return cls(sparse_lu(P), P, csc_array(abs(P)), down[:, None], across[:, None], pencil, is_nudged=True)
+
+    def both_ways(self) -> Factors:
+        """Return what solves with P(s) and its transpose, and its scales, in the order of the model."""
+        down, across = self.down.copy(), self.across.copy()
+        if self.pencil.rows is not None:
+            down[self.pencil.rows] = self.down
+        if self.pencil.columns is not None:
+            across[self.pencil.columns] = self.across
+        return Factors(self.solve_once, self.solve_transposed, down, across)
 
     def solve(self, right: Matrix) -> tuple[ComplexArray, float]:
         """Return ``P(s)^-1 right`` for an (n, k) array, corrected once where needed, and its backward error."""
@@ -284,6 +331,18 @@ class PointFactors:
         back = np.empty_like(solution)
         back[columns] = solution
         return back, backward_error
+
+    def solve_once(self, right: ComplexArray) -> ComplexArray:
+        """Return ``P(s)^-1 right`` for an (n, k) array as the factors give it."""
+        rows, columns = self.pencil.rows, self.pencil.columns
+        scaled = np.asarray((right if rows is None else right[rows]) * self.down)
+        solution: ComplexArray = np.asarray(self.lu.solve(scaled), dtype=np.complex128)
+        solution *= self.across
+        if columns is None:
+            return solution
+        back = np.empty_like(solution)
+        back[columns] = solution
+        return back
 
     def solve_transposed(self, right: Matrix) -> ComplexArray:
         """Return ``P(s)^-T right`` for an (n, k) array."""

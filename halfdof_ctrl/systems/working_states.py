@@ -11,13 +11,13 @@ coordinates) are worked in DOF states, scaled by powers of two.
 import control
 import numpy as np
 import scipy.linalg
-from scipy.linalg.lapack import zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, is_zero, powers_of_two
+from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, is_zero
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import refined
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.model.weak_directions import Factors, refined_along_weak
 from halfdof_ctrl.reduction.choose import reduced
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_system
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
@@ -147,8 +147,9 @@ def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: C
 def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArray) -> ComplexArray:
     """Evaluate a model in energy coordinates, and keep what DOF states gave where that is better.
 
-    Which is better tell refined solves of the descriptor form at a few of the points where they differ, and those
-    values are taken themselves; all of them where neither is right at one of the few, up to a size. A large model
+    Which is better tell refined solves of the descriptor form at a few of the points where they differ, or of all where
+    they agree, and those values are taken themselves; all of them where neither is right at one of the few, up to a
+    size. A large model
     stays in energy coordinates if they are right wherever it is tested.
 
     Parameters
@@ -168,19 +169,20 @@ def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArra
     if len(form.A) > FEW_STATES and _is_sound(form.model, values, points):
         return values
     with np.errstate(invalid="ignore"):
-        apart = np.abs(values - others)
-        doubt = np.isfinite(apart) & (apart > AGREEMENT * np.abs(others))
+        doubt = ~(np.abs(values - others) <= AGREEMENT * np.abs(others))  # a pole on the grid too: is it one?
     doubtful = np.flatnonzero(doubt.any(axis=(0, 1)))
-    if doubtful.size == 0:
-        return values
+    doubtful = doubtful if doubtful.size else np.arange(points.size)  # both may have lost the same
     tested = doubtful[_spread(doubtful.size)]
     exact = refined_response(form.model, points[tested])
     nearest = np.abs(np.arange(points.size)[:, None] - tested).argmin(axis=1)
-    worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
+    with np.errstate(invalid="ignore"):
+        worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
     values = np.where(doubt & worse[:, :, nearest], others, values)
     if not _agree(values[:, :, tested], exact) and doubtful.size * len(form.model.dofs) ** 3 <= SOLVING_EFFORT:
         tested, exact = doubtful, refined_response(form.model, points[doubtful])
-    values[:, :, tested] = np.where(doubt[:, :, tested] & np.isfinite(exact), exact, values[:, :, tested])
+    with np.errstate(invalid="ignore"):
+        wrong = doubt[:, :, tested] | ~(np.abs(values[:, :, tested] - exact) <= SOUND_RESPONSE * np.abs(exact))
+    values[:, :, tested] = np.where(wrong & np.isfinite(exact), exact, values[:, :, tested])
     return values
 
 
@@ -194,8 +196,9 @@ def _is_sound(model: SecondOrderModel, values: ComplexArray, points: ComplexArra
 
 
 def _agree(values: ComplexArray, exact: ComplexArray) -> bool:
-    known = np.isfinite(exact) & np.isfinite(values)
-    return bool((np.abs(values - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
+    known = np.isfinite(exact)  # elsewhere P(s) is singular
+    with np.errstate(invalid="ignore"):
+        return bool((np.abs(values - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
 
 
 def _spread(count: int) -> IndexArray:
@@ -217,13 +220,20 @@ def refined_response(model: SecondOrderModel, points: ComplexArray) -> ComplexAr
     [(0.25+0j)]
     """
     m, coefficients = len(model.inputs), model.quadratics
-    solvers = [_PointSolver(_at(coefficients.P, s)) for s in points.tolist()]
+    factors = [Factors.of_dense(np.asarray(_at(coefficients.P, s), dtype=np.complex128)) for s in points.tolist()]
     right = np.hstack([_at(coefficients.B, s) + 0j for s in points.tolist()])
+    exact = ExactPolynomial(coefficients.P)
 
     def solve(columns: ComplexArray) -> ComplexArray:
-        return np.hstack([solver.solve(columns[:, m * k : m * k + m]) for k, solver in enumerate(solvers)])
+        parts = zip(factors, np.split(columns, len(factors), axis=1), strict=True)
+        return np.hstack([part * np.nan if each is None else each.solve(part) for each, part in parts])
 
-    motion = refined(ExactPolynomial(coefficients.P), np.repeat(points, m), solve(right), right, solve)
+    motion, settled = refined(exact, np.repeat(points, m), solve(right), right, solve)
+    for k, each in enumerate(factors):
+        left = m * k + np.flatnonzero(~settled[m * k : m * k + m])
+        if each is not None and left.size:
+            found = refined_along_weak(exact, complex(points[k]), motion[:, left], right[:, left], each)
+            motion[:, left] = found.solution if found.is_settled else np.nan
     values = [
         _at(coefficients.F, s) @ motion[:, m * k : m * k + m] + _at(coefficients.D, s)
         for k, s in enumerate(points.tolist())
@@ -238,22 +248,6 @@ def _at(coefficients: Coefficients, s: complex) -> FloatArray | ComplexArray:
     for power, part in ((s, linear), (s**2, quadratic)):
         value = value if is_zero(part) else value + power * part
     return value
-
-
-class _PointSolver:
-    """Factors of P(s), its rows and columns scaled by powers of two."""
-
-    def __init__(self, P: ComplexArray | FloatArray) -> None:
-        self.rows = powers_of_two(np.abs(P).max(axis=1))
-        self.columns = powers_of_two(np.abs(self.rows[:, None] * P).max(axis=0))
-        self.factors, self.pivots, self.failed = zgetrf(self.rows[:, None] * P * self.columns)
-
-    def solve(self, right: ComplexArray) -> ComplexArray:
-        """Return the solution for (n, m) right-hand sides, NaN where P(s) is singular."""
-        if self.failed:
-            return np.full(right.shape, complex(np.nan, np.nan))
-        solution, _ = zgetrs(self.factors, self.pivots, self.rows[:, None] * right)
-        return np.asarray(self.columns[:, None] * solution)
 
 
 def _is_large(model: SecondOrderModel) -> bool:
