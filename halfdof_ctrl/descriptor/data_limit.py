@@ -5,20 +5,39 @@ are rounded. Then every solver that sees only these numbers errs alike, and a ch
 nothing. So (DATA) is found where P(s) is nearly singular, and said where it matters.
 """
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.base.digits import digits_in_words
 from halfdof_ctrl.base.errors import DataLimitWarning, give_warning
-from halfdof_ctrl.model.evaluation import data_limit, transfer_and_growth
+from halfdof_ctrl.model.evaluation import data_limit, random_growth, transfer_and_growth
+from halfdof_ctrl.model.quadratics import Quadratics
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
 WARNED_DATA = 1e-6  #: part of the value from which (DATA) is told
 AMPLIFIED = 100.0  #: and times the rounding of a file with few digits, which no one expects to see less of
 MOST_LOOKED, MOST_CHANNELS = 16, 32  #: frequencies, and outputs or inputs, at which (DATA) is found beside a response
+PROBED = 3  #: frequencies at which it is seen whether (DATA) counts
 LAST_DIGIT = "their last digit (2.2e-16)"
 SMALL_SHIFT = 1e-8  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
+
+
+@dataclass(frozen=True, slots=True)
+class Channels:
+    """What a warning says of a response: the names of its channels, and to what its entries are known."""
+
+    outputs: Sequence[str]
+    inputs: Sequence[str]
+    known_to: float = EPS
+
+    @classmethod
+    def of(cls, model: SecondOrderModel) -> "Channels":
+        """Take those of a model."""
+        return cls(model.outputs, model.inputs, model.known_to)
 
 
 def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -> ComplexArray:
@@ -29,18 +48,54 @@ def dense_frequency_response(model: SecondOrderModel, frequencies: FloatArray) -
     DataLimitWarning
         Entries known to their last digit do not determine it to 1e-6 of its value.
     """
+    return warned_response(model.quadratics, frequencies, Channels.of(model))
+
+
+def warned_response(quadratics: Quadratics, frequencies: FloatArray, channels: Channels) -> ComplexArray:
+    """Evaluate ``F(s) P(s)^-1 B(s) + D(s)``, dense, at frequencies [rad/s], (p, m, k).
+
+    Parameters
+    ----------
+    quadratics : tuple of P, B, F, D
+        Coefficients of 1, s, s^2 each.
+    frequencies : (k,) ndarray
+    channels : Channels
+
+    Warns
+    -----
+    DataLimitWarning
+    """
     points = np.asarray(1j * frequencies, dtype=np.complex128)
-    coefficients = model.quadratics
-    values, growth = transfer_and_growth(*coefficients, points)
-    suspect = np.flatnonzero(growth > SUSPECT_GROWTH * EPS / model.known_to)
+    values, growth = transfer_and_growth(*quadratics, points)
+    suspect = np.flatnonzero(growth > SUSPECT_GROWTH * EPS / channels.known_to)
     if suspect.size:
-        limit = data_limit(*coefficients, points[suspect]).of_entries_known_to(model.known_to)
-        warn_of_data(model, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)
+        limit = data_limit(*quadratics, points[suspect]).of_entries_known_to(channels.known_to)
+        warn_of_data(channels, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)
     return values
 
 
-def warn_of_digits(model: SecondOrderModel, frequencies: FloatArray, values: ComplexArray) -> None:
-    """Warn of a response, however it was found, of a model whose entries have the digits of a file.
+def amplifies(model: SecondOrderModel, frequencies: FloatArray) -> bool:
+    """Tell whether rounding of a dense model's entries may be amplified to a part of the response that counts.
+
+    P(s) is looked at, at the ends of the frequencies and between.
+
+    Examples
+    --------
+    >>> from halfdof_ctrl.model.mechss import mechss
+    >>> springs = [np.array([[1.0 + k, -k], [-k, k]]) for k in (4.0, 1e9)]
+    >>> [amplifies(mechss(np.eye(2), None, K), np.array([0.1])) for K in springs]
+    [False, True]
+    """
+    if model.known_to > EPS:
+        return True
+    points = 1j * frequencies[np.unique(np.linspace(0, frequencies.size - 1, PROBED).astype(int))]
+    return bool((random_growth(model.quadratics.P, points) > SUSPECT_GROWTH).any())
+
+
+def warn_of_digits(
+    model: SecondOrderModel, frequencies: FloatArray, values: ComplexArray, *, amplified: bool = False
+) -> None:
+    """Warn of a response, however it was found, of a model whose entries do not determine it.
 
     Parameters
     ----------
@@ -49,28 +104,31 @@ def warn_of_digits(model: SecondOrderModel, frequencies: FloatArray, values: Com
         [rad/s], of which at most 16 are looked at.
     values : (p, m, k) complex ndarray
         Of which the first 32 outputs and inputs are.
+    amplified : bool
+        Look at a model whose entries are known to their last digit as well.
 
     Warns
     -----
     DataLimitWarning
     """
-    if model.known_to <= EPS or len(model.dofs) > LARGEST_DENSE_COPY or not frequencies.size:
+    known = model.known_to <= EPS and not amplified
+    if known or len(model.dofs) > LARGEST_DENSE_COPY or not frequencies.size:
         return
     looked = np.unique(np.linspace(0, frequencies.size - 1, MOST_LOOKED).round().astype(int))
     few = model.select(model.inputs[:MOST_CHANNELS], model.outputs[:MOST_CHANNELS]).as_dense()
     limit = data_limit(*few.quadratics, np.asarray(1j * frequencies[looked])).of_entries_known_to(model.known_to)
     shown = values[:MOST_CHANNELS, :MOST_CHANNELS][:, :, looked]
-    warn_of_data(few, frequencies[looked], shown, limit, looked.size)
+    warn_of_data(Channels.of(few), frequencies[looked], shown, limit, looked.size)
 
 
 def warn_of_data(
-    model: SecondOrderModel, frequencies: FloatArray, values: ComplexArray, limit: DataLimit, asked: int
+    channels: Channels, frequencies: FloatArray, values: ComplexArray, limit: DataLimit, asked: int
 ) -> None:
     """Warn where (DATA) exceeds 1e-6 of the value, with the frequency where it is worst.
 
     Parameters
     ----------
-    model : SecondOrderModel
+    channels : Channels
     frequencies : (k,) ndarray
         [rad/s]
     values : (p, m, k) complex ndarray
@@ -79,7 +137,7 @@ def warn_of_data(
     asked : int
         Frequencies in all.
     """
-    known = model.known_to if model.known_to > EPS else 0.0
+    known = channels.known_to if channels.known_to > EPS else 0.0
     size = np.abs(values)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         told = (size > 0.0) & np.isfinite(size) & (limit.data > max(SMALL_SHIFT, AMPLIFIED * known) * limit.slope)
@@ -87,11 +145,11 @@ def warn_of_data(
     warned = max(WARNED_DATA, AMPLIFIED * known)
     if not share.size or not share.max() > warned:
         return
-    i, j, k = np.unravel_index(int(np.argmax(share)), share.shape)
+    i, j, k = (int(place) for place in np.unravel_index(int(np.argmax(share)), share.shape))
     worst, count = float(share[i, j, k]), int(np.count_nonzero((share > warned).any(axis=(0, 1))))
     digits = f"to {worst:.1e} of its value" if worst < 1.0 else "not at all"
     entries = f"the digits of the file ({digits_in_words(known)}, {known:.0e})" if known else LAST_DIGIT
-    channel = f"{model.outputs[i]} to {model.inputs[j]}"
+    channel = f"{channels.outputs[i]} to {channels.inputs[j]}"
     msg = (
         f"Entries of M, C, K known to {entries} determine the response of {channel} at {frequencies[k]:.4g} rad/s "
         f"{digits} ((DATA), an upper bound; above {warned:.0e} at {count} of {asked} frequencies). "

@@ -9,7 +9,7 @@ from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import InterruptedResponseWarning, give_warning
 from halfdof_ctrl.base.progress import progress
 from halfdof_ctrl.base.threads import limited_threads
-from halfdof_ctrl.descriptor.data_limit import warn_of_data
+from halfdof_ctrl.descriptor.data_limit import Channels, warn_of_data
 from halfdof_ctrl.descriptor.regularity import require_regular_sparse
 from halfdof_ctrl.model.refinement import SUSPECT_GROWTH, DataLimit
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -75,7 +75,7 @@ def sparse_frequency_response(model: SecondOrderModel, frequencies: FloatArray) 
         give_warning(msg, InterruptedResponseWarning)
         values, frequencies = values[:, :, done], frequencies[done]
         limit = DataLimit(limit.data[:, :, done], limit.slope[:, :, done])
-    warn_of_data(model, frequencies, values, limit.of_entries_known_to(model.known_to), frequencies.size)
+    warn_of_data(Channels.of(model), frequencies, values, limit.of_entries_known_to(model.known_to), frequencies.size)
     return values, frequencies
 
 

@@ -76,6 +76,12 @@ def transfer_and_growth(
     return values, growth
 
 
+def random_growth(P: Coefficients, points: ComplexArray) -> FloatArray:
+    """Tell how nearly singular P(s), dense, is at every point, as `transfer_and_growth` does."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        return _solved(_polynomial(P, points), np.zeros((points.size, P[0].shape[0], 0)))[1]
+
+
 def data_limit(P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray) -> DataLimit:
     """Return (DATA) and the slope ``|s dH/ds|`` of dense models at every point, (p, m, k).
 
@@ -198,7 +204,7 @@ def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArra
     return values
 
 
-def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]:
+def _solved(P: ComplexArray, B: ComplexArray | FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Solve ``P x = B`` for a stack of matrices, scaled; give the growth of a random right-hand side too."""
     rows, columns = _scaling_powers(P)
     probe = np.broadcast_to(random_right_side(P.shape[1])[:, None], (*P.shape[:2], 1))

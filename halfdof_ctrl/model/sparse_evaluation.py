@@ -280,7 +280,9 @@ class PointFactors:
     down: FloatArray  #: (n, 1) factors of its rows
     across: FloatArray  #: (n, 1) factors of its columns
     pencil: SparsePencil
-    is_nudged: bool = False  #: whether the rounded sum of the terms is exactly singular: a matrix beside it was factorized
+    is_nudged: bool = (
+        False  #: whether the rounded sum of the terms is exactly singular: a matrix beside it was factorized
+    )
 
     @classmethod
     def of(cls, pencil: SparsePencil, s: complex, ordering: Any, threshold: float) -> "PointFactors":  # noqa: ANN401  # Literal

@@ -8,14 +8,18 @@ Models without energy coordinates (unsymmetric or indefinite M or K, constraints
 coordinates) are worked in DOF states, scaled by powers of two.
 """
 
+from typing import NamedTuple
+
 import control
 import numpy as np
 import scipy.linalg
 
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, is_zero
 from halfdof_ctrl.base.exact_products import ExactPolynomial
+from halfdof_ctrl.descriptor.data_limit import amplifies
+from halfdof_ctrl.model.evaluation import random_growth
 from halfdof_ctrl.model.quadratics import Coefficients
-from halfdof_ctrl.model.refinement import refined
+from halfdof_ctrl.model.refinement import COARSE_GROWTH, refined
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.weak_directions import Factors, refined_along_weak
 from halfdof_ctrl.reduction.choose import reduced
@@ -109,7 +113,14 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     return sys if form is None else energy_state_space(form)
 
 
-def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: ComplexArray) -> ComplexArray:
+class ModelResponse(NamedTuple):
+    """A response, and whether rounding of the model's entries may be amplified in it."""
+
+    values: ComplexArray
+    amplified: bool
+
+
+def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: ComplexArray) -> ModelResponse:
     """Evaluate a model in the states that keep most digits.
 
     DOF states are kept where a bound of rounding says that they are right, or, with many states, where they are right
@@ -125,23 +136,26 @@ def response_of_model(reduction: ExactReduction, dofs: StateSpaceData, points: C
 
     Returns
     -------
-    (p, m, k) complex ndarray
+    ModelResponse
     """
     model, evaluated = reduction.model, bounded_response(*dofs, points)
     values = evaluated.values
     stored = reduction.solution.evidence.loss.value
-    if stored <= SOUND_RESPONSE and evaluated.bound <= min(SOUND_BOUND, SOUND_STORED * reduction.rcond):
-        return values
-    if not model.is_sparse and _is_sound(model, values, points):
-        return values
+    is_sound = stored <= SOUND_RESPONSE and evaluated.bound <= min(SOUND_BOUND, SOUND_STORED * reduction.rcond)
+    if is_sound and reduction.order == 2 * len(model.dofs):
+        return ModelResponse(values, amplified=False)
+    amplified = not _is_large(model) and amplifies(model.as_dense(), np.abs(points))  # static DOFs hide it from A
+    if is_sound and not amplified:
+        return ModelResponse(values, amplified=False)
+    if not (model.is_sparse or _is_free_at_rest(model, points)) and _is_sound(model, values, points):
+        return ModelResponse(values, amplified)
     form = working_form(model, reduction.order)
     if form is not None:
-        return response_of_form(form, values, points)
-    if not model.is_sparse and points.size * len(model.dofs) ** 3 <= SOLVING_EFFORT:
-        exact = refined_response(model, points)
-        return np.where(np.isfinite(exact), exact, values)
-    reduction.solution.evidence.warn_of_loss()
-    return values
+        return ModelResponse(response_of_form(form, values, points), amplified)
+    if _is_large(model) or points.size * len(model.dofs) ** 3 > SOLVING_EFFORT:
+        reduction.solution.evidence.warn_of_loss()
+        return ModelResponse(values, amplified)
+    return ModelResponse(_refined_where_wrong(model.as_dense(), values, values, points), amplified)
 
 
 def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArray) -> ComplexArray:
@@ -168,22 +182,38 @@ def response_of_form(form: EnergyForm, others: ComplexArray, points: ComplexArra
     values = state_space_response(form.A, form.B, output.X, output.direct(form.B.shape[1]), points)
     if len(form.A) > FEW_STATES and _is_sound(form.model, values, points):
         return values
+    return _refined_where_wrong(form.model, values, others, points)
+
+
+def _refined_where_wrong(
+    model: SecondOrderModel, values: ComplexArray, others: ComplexArray, points: ComplexArray
+) -> ComplexArray:
+    """Return the better of two evaluations of a dense model, and refined solves where neither is right."""
     with np.errstate(invalid="ignore"):
-        doubt = ~(np.abs(values - others) <= AGREEMENT * np.abs(others))  # a pole on the grid too: is it one?
+        doubt = ~(np.abs(values - others) <= AGREEMENT * np.abs(others))  # at an infinite value too: is it a pole?
+    doubt &= np.isfinite(values) | (points != 0.0)  # at rest it is that of a free motion
     doubtful = np.flatnonzero(doubt.any(axis=(0, 1)))
-    doubtful = doubtful if doubtful.size else np.arange(points.size)  # both may have lost the same
+    doubtful = doubtful if doubtful.size else np.flatnonzero(points)  # both may have lost the same
+    if doubtful.size == 0:
+        return values
     tested = doubtful[_spread(doubtful.size)]
-    exact = refined_response(form.model, points[tested])
+    exact = refined_response(model, points[tested])
     nearest = np.abs(np.arange(points.size)[:, None] - tested).argmin(axis=1)
     with np.errstate(invalid="ignore"):
         worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
     values = np.where(doubt & worse[:, :, nearest], others, values)
-    if not _agree(values[:, :, tested], exact) and doubtful.size * len(form.model.dofs) ** 3 <= SOLVING_EFFORT:
-        tested, exact = doubtful, refined_response(form.model, points[doubtful])
+    if not _agree(values[:, :, tested], exact) and doubtful.size * len(model.dofs) ** 3 <= SOLVING_EFFORT:
+        tested, exact = doubtful, refined_response(model, points[doubtful])
     with np.errstate(invalid="ignore"):
         wrong = doubt[:, :, tested] | ~(np.abs(values[:, :, tested] - exact) <= SOUND_RESPONSE * np.abs(exact))
     values[:, :, tested] = np.where(wrong & np.isfinite(exact), exact, values[:, :, tested])
     return values
+
+
+def _is_free_at_rest(model: SecondOrderModel, points: ComplexArray) -> bool:
+    """Return whether a value at rest is asked for where K may be singular but for rounding: energy coordinates know."""
+    rest = points[points == 0.0][:1]
+    return bool(rest.size and random_growth(model.quadratics.P, rest).max() > COARSE_GROWTH)
 
 
 def _is_sound(model: SecondOrderModel, values: ComplexArray, points: ComplexArray) -> bool:
