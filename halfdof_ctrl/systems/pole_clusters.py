@@ -156,7 +156,8 @@ def _radius(N: ComplexArray, error: float) -> float:
         return 0.0
 
     def holds(y: float) -> bool:
-        return 2.0 * error * float((sizes[:-1] / y**order).sum()) <= 1.0
+        with np.errstate(divide="ignore", over="ignore"):  # powers of y go below all numbers
+            return 2.0 * error * float(np.exp(np.log(sizes[:-1]) - order * np.log(y)).sum()) <= 1.0
 
     high = low
     while not holds(high):

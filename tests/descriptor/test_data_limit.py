@@ -25,6 +25,24 @@ def test_beam_of_thousands_of_elements_is_refined_and_announced() -> None:
     assert_allclose(found, [tip_receptance(omega) for omega in OMEGA.tolist()], rtol=DISCRETIZED)
 
 
+@pytest.mark.filterwarnings("ignore:Entries of M, C, K known:halfdof_ctrl.errors.DataLimitWarning")
+def test_beam_of_five_thousand_elements_is_right() -> None:
+    """Its mass is lost beside the spacing of the diagonal of K, and found again, just below the first resonance."""
+    found = descriptor_response(slender_beam(5000, is_sparse=True), [2.0]).complex
+    assert_allclose(found, tip_receptance(2.0), rtol=DISCRETIZED)
+
+
+def test_a_response_by_states_says_what_entries_determine() -> None:
+    """A mass on a link of 1e12 N/m, whose node stands on 1 N/m: the static node hides from A what is lost."""
+    model = mechss([[0, 0], [0, 1]], None, [[1e12 + 1, -1e12], [-1e12, 1e12]]).select("F_q1", "q1")
+    with pytest.warns(
+        DataLimitWarning, match=r"determine the response of q1 to F_q1 at 0\.7 rad/s to .*e-03 of its value"
+    ):
+        found = frequency_response(model, [0.1, 0.7]).complex
+    soft = 1.0 / (1.0 + 1e-12)
+    assert_allclose(found, [1.0 / (soft - 0.01), 1.0 / (soft - 0.49)], rtol=1e-11)
+
+
 def test_dense_and_sparse_beams_have_one_response_and_one_limit() -> None:
     """250 elements, by either method, to the last digits; both warn."""
     responses = []

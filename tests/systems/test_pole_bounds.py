@@ -129,3 +129,12 @@ def test_poles_that_a_state_matrix_loses_beside_a_fast_one_come_from_the_pencil(
     omega = np.asarray(frequency_response(model.select("F_q1", "q0")).omega)
     mode = np.sort(np.abs(poles.values))[3]
     assert np.abs(omega / mode - 1.0).min() < 1e-6
+
+
+def test_large_clusters_near_zero_have_a_bound() -> None:
+    """Forty poles at 0, two of them a chain of 1e-12: powers of the bound go below all numbers."""
+    A = np.zeros((40, 40))
+    A[0, 1] = 1e-12
+    poles = bounded_poles(A)
+    assert_allclose(poles.values, 0.0, atol=0.0)
+    assert (poles.bounds < 1e-12).all()
