@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS, LARGEST_DENSE_COPY, ComplexArray, FloatArray
 from halfdof_ctrl.base.digits import digits_in_words
@@ -21,7 +22,10 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 WARNED_DATA = 1e-6  #: part of the value from which (DATA) is told
 AMPLIFIED = 100.0  #: and times the rounding of a file with few digits, which no one expects to see less of
 MOST_LOOKED, MOST_CHANNELS = 16, 32  #: frequencies, and outputs or inputs, at which (DATA) is found beside a response
+CANCELLED = 1e8  #: times the value, what passes directly from input to output and is taken away again
 PROBED = 3  #: frequencies at which it is seen whether (DATA) counts
+SPANNED = 8  #: frequencies at which a motion is looked at
+BELOW_SLOWEST = 0.7  #: of the slowest eigenvalue, where the response is that of springs and of its own
 LAST_DIGIT = "their last digit (2.2e-16)"
 SMALL_SHIFT = 1e-8  #: relative change of frequency that nobody notices: what it makes beside a pole or zero is no loss
 
@@ -67,11 +71,20 @@ def warned_response(quadratics: Quadratics, frequencies: FloatArray, channels: C
     """
     points = np.asarray(1j * frequencies, dtype=np.complex128)
     values, growth = transfer_and_growth(*quadratics, points)
-    suspect = np.flatnonzero(growth > SUSPECT_GROWTH * EPS / channels.known_to)
+    suspect = np.flatnonzero(
+        _cancels(quadratics, frequencies, values) | (growth > SUSPECT_GROWTH * EPS / channels.known_to)
+    )
     if suspect.size:
         limit = data_limit(*quadratics, points[suspect]).of_entries_known_to(channels.known_to)
         warn_of_data(channels, frequencies[suspect], values[:, :, suspect], limit, frequencies.size)
     return values
+
+
+def _cancels(quadratics: Quadratics, frequencies: FloatArray, values: ComplexArray) -> npt.NDArray[np.bool_]:
+    """Tell at which frequencies (k,) what passes directly from input to output is taken away again."""
+    parts = [np.abs(np.asarray(part))[:, :, None] * frequencies**k for k, part in enumerate(quadratics.D)]
+    with np.errstate(invalid="ignore"):
+        return np.asarray((np.sum(parts, axis=0) > CANCELLED * np.abs(values)).any(axis=(0, 1)))
 
 
 def amplifies(model: SecondOrderModel, frequencies: FloatArray) -> bool:
@@ -90,6 +103,47 @@ def amplifies(model: SecondOrderModel, frequencies: FloatArray) -> bool:
         return True
     points = 1j * frequencies[np.unique(np.linspace(0, frequencies.size - 1, PROBED).astype(int))]
     return bool((random_growth(model.quadratics.P, points) > SUSPECT_GROWTH).any())
+
+
+def warn_of_values(model: SecondOrderModel, frequencies: FloatArray, values: ComplexArray) -> None:
+    """Warn of a response (p, m, k) of a model, dense or of a size that its dense copy serves.
+
+    Warns
+    -----
+    DataLimitWarning
+    """
+    if len(model.dofs) > LARGEST_DENSE_COPY:
+        return
+    dense = model.as_dense()
+    if _cancels(dense.quadratics, frequencies, values).any() or amplifies(dense, frequencies):
+        warn_of_digits(dense, frequencies, values, amplified=True)
+
+
+def warn_of_span(model: SecondOrderModel, lowest: float, highest: float) -> None:
+    """Warn of what is made of a model's motion between two frequencies [rad/s], such as a time response.
+
+    Warns
+    -----
+    DataLimitWarning
+    """
+    if len(model.dofs) > LARGEST_DENSE_COPY:
+        return
+    few = model.select(model.inputs[:MOST_CHANNELS], model.outputs[:MOST_CHANNELS]).as_dense()
+    frequencies = np.geomspace(lowest, highest, SPANNED)
+    if amplifies(few, frequencies):
+        warn_of_digits(few, frequencies, few(1j * frequencies, squeeze=False), amplified=True)
+
+
+def warn_of_eigenvalues(model: SecondOrderModel, eigenvalues: ComplexArray) -> None:
+    """Warn of eigenvalues of a model that are shown, by its response from below the slowest to the fastest of them.
+
+    Warns
+    -----
+    DataLimitWarning
+    """
+    speeds = np.abs(eigenvalues)[(eigenvalues != 0.0) & np.isfinite(eigenvalues)]
+    if speeds.size:
+        warn_of_span(model, BELOW_SLOWEST * float(speeds.min()), float(speeds.max()))
 
 
 def warn_of_digits(

@@ -10,6 +10,7 @@ from matplotlib.patches import Circle
 from halfdof_ctrl.base.arrays import ComplexArray
 from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import NoStateSpaceError, ParameterError
+from halfdof_ctrl.descriptor.data_limit import warn_of_eigenvalues
 from halfdof_ctrl.descriptor.finite_part import finite_part
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.descriptor.zeros import zeros
@@ -78,6 +79,11 @@ def pole_map_plot(
     SingularPencilError
         ``det P(s)`` of the model vanishes identically.
 
+    Warns
+    -----
+    DataLimitWarning
+        Entries of the model known to their last digit do not determine its slow motion.
+
     Examples
     --------
     >>> import matplotlib.pyplot as plt
@@ -118,17 +124,19 @@ def _marks(sysdata: control.StateSpace | SecondOrderModel, feedback: StateFeedba
     if isinstance(sysdata, SecondOrderModel):
         structure = pencil_structure(sysdata)
         infinite = structure.n_infinite
+        poles = _poles_of_A(sysdata, closed)
+        warn_of_eigenvalues(sysdata, np.concatenate([structure.finite_eigenvalues, *[mark[0] for mark in poles]]))
         marks = [
-            *_poles_of_A(sysdata, closed),
+            *poles,
             (structure.finite_eigenvalues, "finite eigenvalues of (M, C, K)", RING),
             (zeros(sysdata), "zeros", ZERO_MARK),
             (NONE, f"{infinite} infinite eigenvalue{'s' * (infinite != 1)} deflated", NO_MARK),
         ]
     else:
-        poles = bounded_poles(np.asarray(sysdata.A, dtype=float)).values
+        values = bounded_poles(np.asarray(sysdata.A, dtype=float)).values
         if sysdata.isdtime(strict=True):
-            poles = np.asarray(sysdata.poles())
-        marks = [(poles, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
+            values = np.asarray(sysdata.poles())
+        marks = [(values, f"poles of A{closed}", CROSS), (_zeros_of(sysdata), "zeros", ZERO_MARK)]
     if feedback is not None:
         marks.insert(1, (np.asarray(feedback.poles), "poles with feedback", CLOSED))
     return [mark for mark in marks if mark[0].size or mark[2] is NO_MARK]

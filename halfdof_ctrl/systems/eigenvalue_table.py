@@ -9,6 +9,7 @@ import scipy.optimize
 
 from halfdof_ctrl.base.arrays import ComplexArray
 from halfdof_ctrl.base.words import eigenvalue_in_words
+from halfdof_ctrl.descriptor.data_limit import warn_of_eigenvalues
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.second_order import SecondOrderModel
 
@@ -57,6 +58,11 @@ def eigenvalue_table(model: SecondOrderModel, sys: control.StateSpace) -> Eigenv
     -------
     EigenvalueTable
 
+    Warns
+    -----
+    DataLimitWarning
+        Entries of the model known to their last digit do not determine its slow motion.
+
     Examples
     --------
     >>> model = mechss([[0]], [[5]], [[10]])
@@ -65,6 +71,7 @@ def eigenvalue_table(model: SecondOrderModel, sys: control.StateSpace) -> Eigenv
     """
     structure = pencil_structure(model)
     finite, poles = structure.finite_eigenvalues, np.linalg.eigvals(np.asarray(sys.A)).astype(np.complex128)
+    warn_of_eigenvalues(model, poles)
     first, second = scipy.optimize.linear_sum_assignment(np.abs(finite[:, None] - poles))
     rows = _paired_rows(finite[first], poles[second])
     rows += [(eigenvalue_in_words(value), "missing", "") for value in np.delete(finite, first).tolist()]

@@ -22,6 +22,7 @@ from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.base.names import Names, as_tuple, control_label, force_names, listed, reaction_names
 from halfdof_ctrl.base.sparse_arrays import locked
+from halfdof_ctrl.descriptor.data_limit import warn_of_values
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.doors import checked_model
@@ -33,7 +34,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.systems.default_grid import MARGIN, default_frequencies
 from halfdof_ctrl.systems.frequency import DEFAULT_POINTS, checked_frequencies
 from halfdof_ctrl.systems.pencil_poles import pencil_poles
-from halfdof_ctrl.systems.phase_sources import Source, source_of, with_source
+from halfdof_ctrl.systems.phase_sources import source_of, with_source
 from halfdof_ctrl.systems.seen_modes import Response, seen_poles
 
 TransmissibilityKind: TypeAlias = Literal["motion", "force"]
@@ -162,12 +163,17 @@ def dynamic_stiffness_response(
         As in `dynamic_stiffness`.
     ParameterError
         Frequencies that are no finite, nonnegative numbers.
+
+    Warns
+    -----
+    DataLimitWarning
+        Of a single DOF: entries do not determine it to 1e-6 of its value.
     """
     frequencies = checked_frequencies(motion_frequencies([model], dof, free=True) if omega is None else omega)
     values = dynamic_stiffness(model, dof, 1j * frequencies)
     names = as_tuple(dof)
     data = _data(values, frequencies, names, reaction_names(names), model)
-    return with_source(data, _stiffness_source(model, names))
+    return _with_source(data, _stiffness_model(model, names))
 
 
 def transmissibility_response(
@@ -198,6 +204,11 @@ def transmissibility_response(
         As in `transmissibility`.
     ParameterError
         As in `transmissibility`, or frequencies that are no finite, nonnegative numbers.
+
+    Warns
+    -----
+    DataLimitWarning
+        As `dynamic_stiffness_response` does.
     """
     _require_transmissibility(kind)
     held, other = (from_, to) if kind == "motion" else (to, from_)
@@ -208,29 +219,34 @@ def transmissibility_response(
     if kind == "force":
         causes, results = force_names(causes), reaction_names(results)
     data = _data(values, frequencies, causes, results, model)
-    return with_source(data, _transmissibility_source(model, as_tuple(from_), as_tuple(to), kind))
+    return _with_source(data, _transmissibility_model(model, as_tuple(from_), as_tuple(to), kind))
 
 
-def _stiffness_source(model: SecondOrderModel, names: tuple[str, ...]) -> Source | None:
+def _with_source(data: control.FrequencyResponseData, moved: SecondOrderModel | None) -> control.FrequencyResponseData:
+    """Say of a response whose transfer function it is, and warn where entries do not determine it."""
+    if moved is not None:
+        warn_of_values(moved, np.asarray(data.frequency), np.asarray(data.complex).reshape(1, 1, -1))
+    return with_source(data, None if moved is None else source_of(moved))
+
+
+def _stiffness_model(model: SecondOrderModel, names: tuple[str, ...]) -> SecondOrderModel | None:
     """Return the model whose transfer function the dynamic stiffness at a single DOF is."""
     rest = _at_rest(model)
-    if len(names) > 1 or len(rest.dofs) == 1:
-        return None
-    return source_of(replace(rest, prescribed=()).prescribe_motion(names))
+    return None if len(names) > 1 or len(rest.dofs) == 1 else replace(rest, prescribed=()).prescribe_motion(names)
 
 
-def _transmissibility_source(
+def _transmissibility_model(
     model: SecondOrderModel, from_: tuple[str, ...], to: tuple[str, ...], kind: TransmissibilityKind
-) -> Source | None:
+) -> SecondOrderModel | None:
     """Return the model whose transfer function the transmissibility between two DOFs is."""
     rest = replace(_at_rest(model), prescribed=())
     if len(from_) > 1 or len(to) > 1 or len(rest.dofs) == 1 or from_ == to:
         return None
     if kind == "motion":
-        return source_of(rest.prescribe_motion(from_, outputs=list(to)))
+        return rest.prescribe_motion(from_, outputs=list(to))
     moved = rest.prescribe_motion(to, inputs=list(force_names(from_)), outputs=list(reaction_names(to)))
     signs: dict[str, Any] = {letter: locked(-getattr(moved, letter)) for letter in ("F", "G", "H", "D", "Dv", "Da")}
-    return source_of(replace(moved, **signs))  # what arrives at the support is minus its reaction
+    return replace(moved, **signs)  # what arrives at the support is minus its reaction
 
 
 def motion_frequencies(

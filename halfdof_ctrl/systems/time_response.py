@@ -18,6 +18,7 @@ from halfdof_ctrl.base.by_name import by_name
 from halfdof_ctrl.base.doors import real_numbers
 from halfdof_ctrl.base.errors import HalfdofError, ParameterError
 from halfdof_ctrl.base.names import control_label, control_labels
+from halfdof_ctrl.descriptor.data_limit import warn_of_span
 from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.choose import reduced
@@ -34,6 +35,7 @@ from halfdof_ctrl.systems.working_states import working_map
 Motion: TypeAlias = npt.ArrayLike | Mapping[str, float] | None
 Histories: TypeAlias = npt.ArrayLike | Mapping[str, npt.ArrayLike]
 
+SLOWEST_TURN, FASTEST_TURN = 2.0, 60.0  #: angles [rad] that motions turn in a response, from the slowest that show on
 EVEN_TIMES = 1e-6  #: relative differences between time steps that are rounding
 MOST_TIMED = 200  #: DOFs of a sparse model up to which times are chosen for all of them, not only for outputs
 
@@ -61,6 +63,11 @@ def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None)
         Times that are not rising and equidistant.
     ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         The model has no state space (see `mech2ss`).
+
+    Warns
+    -----
+    DataLimitWarning
+        Entries known to their last digit do not determine the motion to 1e-6, at a frequency that it shows.
 
     Examples
     --------
@@ -109,6 +116,11 @@ def initial_response(
     InconsistentStateError
         A value that the equations without inertia do not allow.
     ParameterError, ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
+        As in `step_response`.
+
+    Warns
+    -----
+    DataLimitWarning
         As in `step_response`.
 
     Examples
@@ -161,6 +173,11 @@ def forced_response(
         An input that is not there.
     ParameterError, InconsistentStateError, ComplexModelError, SingularPencilError, UncertainRankError, ImproperError
         As in `initial_response`; or inputs of another shape.
+
+    Warns
+    -----
+    DataLimitWarning
+        As in `step_response`.
 
     Examples
     --------
@@ -249,6 +266,12 @@ class _Plant:
         outputs = np.asarray(found.y, dtype=float).reshape(self.sys.noutputs, time.size)
         return outputs, states if self.states is None else self.states.to_dofs(states)
 
+    def warn(self, time: FloatArray) -> None:
+        """Warn where entries do not determine the motion: what lasts as long as the response, and what is faster."""
+        span = float(time[-1] - time[0])
+        if self.sys.nstates and span > 0.0:
+            warn_of_span(self.model, SLOWEST_TURN / span, FASTEST_TURN / span)
+
     def data(
         self,
         time: FloatArray,
@@ -268,6 +291,7 @@ class _Plant:
                 "Give a shorter time."
             )
             raise ParameterError(msg, parameter="timepts", value=float(time[bad][0]))
+        self.warn(time)
         name = control_label(model.name) if model.name else None
         several = {} if trace_labels is None else {"trace_labels": trace_labels, "trace_types": ["step"] * len(inputs)}
         return control.TimeResponseData(

@@ -1,6 +1,7 @@
 """Warnings of responses that the entries of a model do not determine."""
 
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,8 +9,19 @@ import pytest
 from hypothesis import given
 from numpy.testing import assert_allclose
 
-from halfdof_ctrl import descriptor_response, frequency_response, mechss
+from halfdof_ctrl import (
+    SecondOrderModel,
+    descriptor_response,
+    dynamic_stiffness_response,
+    forced_response,
+    frequency_response,
+    initial_response,
+    mechss,
+    step_response,
+)
 from halfdof_ctrl.base.errors import DataLimitWarning
+from halfdof_ctrl.systems.eigenvalue_table import eigenvalue_table
+from halfdof_ctrl.systems.state_space import system_of_model
 from support.slender_beam import slender_beam, tip_receptance
 from support.structures import Structure, damped_structures
 
@@ -96,3 +108,29 @@ def test_a_response_by_states_is_warned_of_as_well() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         frequency_response(replace(mechss(np.eye(2), 0.1 * np.eye(2), [[5, -1], [-1, 5]]), known_to=5e-10), OMEGA)
+
+
+def on_link(stiffness: float) -> SecondOrderModel:
+    """Put a mass of 1 kg on a link, whose node stands on 1 N/m."""
+    K = [[stiffness + 1.0, -stiffness], [-stiffness, stiffness]]
+    return mechss(np.diag([0.0, 1.0]), np.diag([0.1, 0.0]), K).select("F_q1", "q1")
+
+
+@pytest.mark.parametrize(
+    "show",
+    [
+        lambda model: step_response(model, np.linspace(0.0, 10.0, 50)),
+        lambda model: initial_response(model, np.linspace(0.0, 10.0, 50), displacement={"q1": 1.0}),
+        lambda model: forced_response(model, np.linspace(0.0, 10.0, 50), 1.0),
+        lambda model: dynamic_stiffness_response(model, "q1", [0.1, 0.7]),
+        lambda model: eigenvalue_table(model, system_of_model(model)),
+    ],
+    ids=["step", "initial", "forced", "stiffness", "eigenvalues"],
+)
+def test_whatever_shows_digits_says_what_entries_determine(show: Callable[[SecondOrderModel], object]) -> None:
+    """A link of 1e12 N/m makes everything slow known to 1e-3; one of 1e4 N/m to 1e-11."""
+    with pytest.warns(DataLimitWarning, match="determine the response of (q1 to F_q1|R_q1 to q1)"):
+        show(on_link(1e12))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        show(on_link(1e4))
