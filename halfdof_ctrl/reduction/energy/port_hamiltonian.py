@@ -19,9 +19,7 @@ from halfdof_ctrl.model.doors import checked_model
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.energy.form import EnergyForm, energy_form
 
-PASSIVE_WITHIN = (
-    4 * EPS
-)  #: times n: eigenvalues of C at unit diagonal, or of R relative to its largest, that are no fault
+PASSIVE_WITHIN = 4 * EPS  #: times n: negative eigenvalues of C, each DOF in its own unit, that are rounding
 ENTERING_SHARE = 0.1  #: of the largest power that enters: DOFs with less are not named
 
 
@@ -80,13 +78,16 @@ def port_hamiltonian(model: SecondOrderModel) -> PortHamiltonian:
     """
     form = energy_form(checked_model(model, "port_hamiltonian"))
     exchanged, lost = _split(form)
-    smallest = _smallest_at_unit_diagonal(np.asarray(form.model.C, dtype=float))
-    is_passive = smallest >= -PASSIVE_WITHIN * len(form.model.dofs)
+    damping = (np.asarray(form.model.C, dtype=float) + np.asarray(form.model.C, dtype=float).T) / 2.0
+    smallest, _ = _smallest(damping, np.abs(np.diagonal(damping)))
+    rounding = PASSIVE_WITHIN * len(form.model.dofs)
+    is_passive = smallest >= -rounding
     dofs: tuple[str, ...] = ()
     if not is_passive:
-        values, vectors = np.linalg.eigh(lost)
-        is_passive = bool(values[0] >= -PASSIVE_WITHIN * len(lost) * np.abs(values).max())
-        dofs = () if is_passive else _entrances(form, vectors[:, 0])
+        K, _, M = (np.diagonal(np.asarray(part, dtype=float)) for part in form.model.quadratics.P)
+        least, velocity = _smallest(damping, np.maximum(np.abs(np.diagonal(damping)), np.sqrt(np.abs(K * M))))
+        is_passive = least >= -rounding
+        dofs = () if is_passive else _entrances(form, lost, velocity)
     return PortHamiltonian(
         J=read_only(exchanged),
         R=read_only(lost),
@@ -110,21 +111,32 @@ def _split(form: EnergyForm) -> tuple[FloatArray, FloatArray]:
     return exchanged, lost + 0.0
 
 
-def _smallest_at_unit_diagonal(C: FloatArray) -> float:
-    """Return the smallest eigenvalue of the symmetric part of C scaled to unit diagonal, 0 for none."""
-    symmetric = (C + C.T) / 2.0
-    used = symmetric.any(axis=0)
+def _smallest(C: FloatArray, size: FloatArray) -> tuple[float, FloatArray]:
+    """Return the smallest eigenvalue of a symmetric C in units in which its diagonal is at most one, and its motion.
+
+    The sizes of DOFs may be those of their dampers, or of what their own springs and masses would make of them: beside
+    these, and not beside the dampers of other DOFs, a negative damper is rounding or not.
+    """
+    used = C.any(axis=0)
+    velocity = np.zeros(len(C))
     if not used.any():
-        return 0.0
-    part = symmetric[np.ix_(used, used)]
-    size = np.sqrt(np.abs(np.diagonal(part)))
-    scale = 1.0 / np.where(size > 0.0, size, np.sqrt(np.abs(part).max(axis=0)))
-    return float(np.linalg.eigvalsh(scale[:, None] * part * scale)[0])
+        return 0.0, velocity
+    part = C[np.ix_(used, used)]
+    root = np.sqrt(size[used])
+    scale = 1.0 / np.where(root > 0.0, root, np.sqrt(np.abs(part).max(axis=0)))
+    values, vectors = np.linalg.eigh(scale[:, None] * part * scale)
+    velocity[used] = scale * vectors[:, 0]
+    return float(values[0]), velocity
 
 
-def _entrances(form: EnergyForm, x: FloatArray) -> tuple[str, ...]:
-    """Return the DOFs at which dampers feed energy into a motion, the strongest first."""
-    velocity = form.velocity.X @ x
+def _entrances(form: EnergyForm, lost: FloatArray, velocity: FloatArray) -> tuple[str, ...]:
+    """Return the DOFs at which dampers feed energy into a motion, the strongest first.
+
+    That is the motion of the most negative eigenvalue of R, or a given one where dampers that are far larger hide it.
+    """
+    values, vectors = np.linalg.eigh(lost)
+    if values[0] < -PASSIVE_WITHIN * len(lost) * np.abs(values).max():
+        velocity = form.velocity.X @ vectors[:, 0]
     power = -velocity * ((form.model.C + form.model.C.T) / 2.0 @ velocity)
     strongest = float(power.max())
     order = [j for j in np.argsort(-power, kind="stable").tolist() if power[j] >= ENTERING_SHARE * strongest]

@@ -52,6 +52,21 @@ def test_coupled_dampers_are_passive_up_to_their_bound(inside: float, outside: f
         assert_allclose(ph.smallest, 1.0 - g, atol=ROUNDING)
 
 
+@pytest.mark.parametrize("other", [1e3, 1e15, 1e40])
+def test_a_strong_damper_elsewhere_hides_no_negative_one(other: float) -> None:
+    """A mass that gains a hundredth of its own speed is unstable, whatever else loses energy."""
+    ph = port_hamiltonian(mechss(np.eye(2), np.diag([-0.01, other]), np.diag([4.0, 1.0]), dofs=["a", "b"]))
+    assert not ph.is_passive
+    assert ph.dofs == ("a",)
+
+
+def test_rounding_of_a_sum_of_dampers_is_no_fault() -> None:
+    """0.1 + 0.2 - 0.3 is not zero; of a DOF whose spring and mass make 2 N s/m that is rounding."""
+    left = 0.3 - (0.1 + 0.2)
+    assert left < 0.0
+    assert port_hamiltonian(mechss(np.eye(2), np.diag([left, 1.0]), np.diag([4.0, 1.0]))).is_passive
+
+
 def test_dofs_through_which_energy_enters_are_named_strongest_first() -> None:
     """Negative dampers of 5 at b and 0.1 at c: the worst motion is that of b alone."""
     ph = port_hamiltonian(mechss(np.eye(3), np.diag([1.0, -5.0, -0.1]), np.eye(3), dofs=["a", "b", "c"]))
