@@ -22,7 +22,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 WARNED_DATA = 1e-6  #: part of the value from which (DATA) is told
 AMPLIFIED = 100.0  #: and times the rounding of a file with few digits, which no one expects to see less of
 MOST_LOOKED, MOST_CHANNELS = 16, 32  #: frequencies, and outputs or inputs, at which (DATA) is found beside a response
-CANCELLED = 1e8  #: times the value, what passes directly from input to output and is taken away again
+FEED_CANCELLED = 1e8  #: times the value, what passes directly from input to output and is taken away again
 PROBED = 3  #: frequencies at which it is seen whether (DATA) counts
 SPANNED = 8  #: frequencies at which a motion is looked at
 BELOW_SLOWEST = 0.7  #: of the slowest eigenvalue, where the response is that of springs and of its own
@@ -84,7 +84,7 @@ def _cancels(quadratics: Quadratics, frequencies: FloatArray, values: ComplexArr
     """Tell at which frequencies (k,) what passes directly from input to output is taken away again."""
     parts = [np.abs(np.asarray(part))[:, :, None] * frequencies**k for k, part in enumerate(quadratics.D)]
     with np.errstate(invalid="ignore"):
-        return np.asarray((np.sum(parts, axis=0) > CANCELLED * np.abs(values)).any(axis=(0, 1)))
+        return np.asarray((np.sum(parts, axis=0) > FEED_CANCELLED * np.abs(values)).any(axis=(0, 1)))
 
 
 def amplifies(model: SecondOrderModel, frequencies: FloatArray) -> bool:

@@ -25,7 +25,7 @@ from halfdof_ctrl.model.weak_directions import Factors, refined_along_weak, refi
 
 FACTORS_HELD = 2**20  #: complex entries of factors held at a time (16 MB)
 MOST_ROUNDS = 4  #: of refinement; two are enough but where P(s) is nearly singular
-SMALL_STEP = REFINED_ENOUGH**0.5  #: a correction below this part of the largest unknown is the last but for rounding
+LAST_STEP = REFINED_ENOUGH**0.5  #: a correction below this part of the largest unknown is the last but for rounding
 NO_FACTORS = Factors(lambda right: right, lambda right: right, np.zeros((0, 1)), np.zeros((0, 1)))  #: of no unknowns
 
 
@@ -177,11 +177,11 @@ class ResponseEvaluator:
                     continue
                 point.x = point.x + correction
                 last[point.place] = share
-                if share > SMALL_STEP:  # errors shrink by the same factor once more
+                if share > LAST_STEP:  # errors shrink by the same factor once more
                     further.append(point)
             left = further
         for point in solved:
-            if point.x.size and (point.factors.is_nudged or last[point.place] > SMALL_STEP):
+            if point.x.size and (point.factors.is_nudged or last[point.place] > LAST_STEP):
                 found = refined_along_weak(self.exact, point.s, point.x, point.right, point.factors)
                 is_lost = found.is_singular or (point.factors.is_nudged and not found.is_settled)
                 point.x = np.full_like(point.x, np.nan) if is_lost else found.solution

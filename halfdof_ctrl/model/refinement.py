@@ -20,7 +20,7 @@ SUSPECT_GROWTH = 1e5  #: growth of a random solution above which the sum of the 
 COARSE_GROWTH = 1e-3 / EPS  #: the same, above which a solution that is not refined lacks the digits (DATA) asks for
 REFINED_ENOUGH = 4 * EPS  #: a correction below this part of the largest unknown is the last
 ENOUGH_FOR_DATA = 1e-3  #: the same where three digits are enough
-SETTLED = 1e-12  #: a solution whose corrections stay above this part of it is not found by the factors
+REFINED_SOLUTION = 1e-12  #: a solution whose corrections stay above this part of it is not found by the factors
 SHRINKS = 0.1  #: corrections that do not shrink by this factor lead nowhere soon: P(s) is singular to rounding
 
 
@@ -85,7 +85,7 @@ def refined(
         last = np.where(better & (share > enough), share, 0.0)
         if not last.any():
             break
-    return best, smallest <= max(SETTLED, enough)
+    return best, smallest <= max(REFINED_SOLUTION, enough)
 
 
 def random_right_side(size: int) -> FloatArray:

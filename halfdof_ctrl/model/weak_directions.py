@@ -20,7 +20,7 @@ from scipy.linalg.lapack import zgetrf, zgetrs
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, powers_of_two
 from halfdof_ctrl.base.exact_products import ExactPolynomial
-from halfdof_ctrl.model.refinement import REFINED_ENOUGH, SETTLED, refined
+from halfdof_ctrl.model.refinement import REFINED_ENOUGH, REFINED_SOLUTION, refined
 
 Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
@@ -29,10 +29,8 @@ MORE_DIRECTIONS = 4  #: times as many where corrections do not shrink
 WEAK_ROUNDS = 40  #: of correction at most, of which three to five are usual
 SHRINKS_WELL = 0.1  #: corrections that do not shrink by this factor ask for more directions
 WEAK_SETTLED = 1e-9  #: a solution whose corrections stay above this part of it is given up
-SINGULAR = (
-    2.0**-92
-)  #: a direction that moves P(s) by less is not told from none: sums have 2^-100 of the largest product
-NUDGE = 2.0**-50  #: of rows and columns of size one, added to a diagonal whose factors are exactly singular
+WEAKEST = 2.0**-92  #: a direction that moves P(s) by less moves it not: sums know 2^-100 of their terms
+FACTOR_NUDGE = 2.0**-50  #: of rows and columns of size one, added to a diagonal whose factors are exactly singular
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +77,7 @@ class Factors:
 
 def nudge(size: int) -> FloatArray:
     """Return uneven numbers of the size of rounding, the same at every call."""
-    return np.asarray(NUDGE * np.random.default_rng(1).uniform(1.0, 2.0, size))
+    return np.asarray(FACTOR_NUDGE * np.random.default_rng(1).uniform(1.0, 2.0, size))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,7 +201,7 @@ def refined_along_weak(
         if share <= enough:
             break
         if not share <= SHRINKS_WELL * last:
-            if share <= max(SETTLED, enough) or (count >= min(n, MOST_DIRECTIONS) and not given):
+            if share <= max(REFINED_SOLUTION, enough) or (count >= min(n, MOST_DIRECTIONS) and not given):
                 break
             count = count if given else min(n, MORE_DIRECTIONS * count)
             found, given, last = WeakDirections.of(factors, count), False, np.inf
@@ -218,7 +216,7 @@ def refined_along_weak(
 def _is_singular(small: ComplexArray) -> bool:
     if not np.isfinite(small).all():
         return True
-    return bool(np.linalg.svd(small, compute_uv=False).min(initial=np.inf) < SINGULAR)
+    return bool(np.linalg.svd(small, compute_uv=False).min(initial=np.inf) < WEAKEST)
 
 
 def _share(correction: ComplexArray, solution: ComplexArray, across: FloatArray) -> float:
