@@ -23,7 +23,6 @@ WARNED_DATA = 1e-6  #: part of the value from which (DATA) is told
 AMPLIFIED = 100.0  #: and times the rounding of a file with few digits, which no one expects to see less of
 MOST_LOOKED, MOST_CHANNELS = 16, 32  #: frequencies, and outputs or inputs, at which (DATA) is found beside a response
 FEED_CANCELLED = 1e8  #: times the value, what passes directly from input to output and is taken away again
-PROBED = 3  #: frequencies at which it is seen whether (DATA) counts
 SPANNED = 8  #: frequencies at which a motion is looked at
 BELOW_SLOWEST = 0.7  #: of the slowest eigenvalue, where the response is that of springs and of its own
 LAST_DIGIT = "their last digit (2.2e-16)"
@@ -101,7 +100,7 @@ def amplifies(model: SecondOrderModel, frequencies: FloatArray) -> bool:
     """
     if model.known_to > EPS:
         return True
-    points = 1j * frequencies[np.unique(np.linspace(0, frequencies.size - 1, PROBED).astype(int))]
+    points = np.asarray(1j * frequencies[[0, frequencies.size // 2, -1]], dtype=np.complex128)
     return bool((random_growth(model.quadratics.P, points) > SUSPECT_GROWTH).any())
 
 

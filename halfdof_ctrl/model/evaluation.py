@@ -79,7 +79,11 @@ def transfer_and_growth(
 def random_growth(P: Coefficients, points: ComplexArray) -> FloatArray:
     """Tell how nearly singular P(s), dense, is at every point, as `transfer_and_growth` does."""
     with np.errstate(invalid="ignore", over="ignore"):
-        return _solved(_polynomial(P, points), np.zeros((points.size, P[0].shape[0], 0)))[1]
+        matrix = _polynomial(P, points)
+        rows, columns = _scaling_powers(matrix)
+        right = np.broadcast_to(random_right_side(P[0].shape[0])[:, None], (*matrix.shape[:2], 1))
+        growth = np.abs(_solve_each(matrix * rows * columns, right)).max(axis=(1, 2), initial=0.0)
+    return np.where(np.isfinite(growth), growth, np.inf)
 
 
 def data_limit(P: Coefficients, B: Coefficients, F: Coefficients, D: Coefficients, points: ComplexArray) -> DataLimit:
@@ -204,7 +208,7 @@ def _polynomial(coefficients: Coefficients, points: ComplexArray) -> ComplexArra
     return values
 
 
-def _solved(P: ComplexArray, B: ComplexArray | FloatArray) -> tuple[ComplexArray, FloatArray]:
+def _solved(P: ComplexArray, B: ComplexArray) -> tuple[ComplexArray, FloatArray]:
     """Solve ``P x = B`` for a stack of matrices, scaled; give the growth of a random right-hand side too."""
     rows, columns = _scaling_powers(P)
     probe = np.broadcast_to(random_right_side(P.shape[1])[:, None], (*P.shape[:2], 1))
@@ -226,7 +230,7 @@ def _scaling_powers(P: ComplexArray) -> tuple[FloatArray, FloatArray]:
     return rows, powers_of_two(np.abs(P * rows).max(axis=1, initial=0.0))[:, None, :]
 
 
-def _solve_each(P: ComplexArray, B: ComplexArray) -> ComplexArray:
+def _solve_each(P: ComplexArray, B: ComplexArray | FloatArray) -> ComplexArray:
     try:
         return np.asarray(np.linalg.solve(P, B), dtype=np.complex128)
     except np.linalg.LinAlgError:  # one of the stack is exactly singular: that one is infinite
