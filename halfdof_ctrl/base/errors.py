@@ -306,6 +306,21 @@ def recording_warnings() -> Iterator[list[RecordedWarning]]:
         _RECORD.reset(before)
 
 
+def give_first_of_each_kind(caught: Iterable[RecordedWarning]) -> None:
+    """Warn of what was held back, of each kind once: a curve and the marks on it have one cause.
+
+    >>> with recording_warnings() as told:
+    ...     give_first_of_each_kind([RecordedWarning(text, LostDigitsWarning) for text in ("curve", "marks")])
+    >>> [warning.message for warning in told]
+    ['curve']
+    """
+    kinds = set()
+    for message, category in caught:
+        if category not in kinds:
+            give_warning(message, category)
+        kinds.add(category)
+
+
 def own_messages(caught: Iterable[warnings.WarningMessage | RecordedWarning]) -> list[str]:
     """Give the texts of this package's own warnings, each once: the user can do nothing about other packages'."""
     own = (warning for warning in caught if issubclass(warning.category, HalfdofWarning))

@@ -15,6 +15,9 @@ from halfdof_ctrl.base.doors import require_switches, require_texts
 from halfdof_ctrl.base.errors import (
     NoStateSpaceError,
     ParameterError,
+    RecordedWarning,
+    give_first_of_each_kind,
+    recording_warnings,
 )
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -149,7 +152,8 @@ def bode_plot(
     """
     require_texts(title=title, label=label)
     require_switches(dB=dB, Hz=Hz, deg=deg, grid=grid)
-    curve, kind, reference = _curve(sysdata, omega, reference)
+    with recording_warnings() as of_curve:
+        curve, kind, reference = _curve(sysdata, omega, reference)
     named = sysdata if reference is None else reference
     known = known_units(named, units)
     p, m = curve.noutputs, curve.ninputs
@@ -157,11 +161,8 @@ def bode_plot(
     axes = prepared_axes(ax, (2 * p, m), what, height=4.2 if p == 1 else 1.0 + 3.0 * p, ratios=[1.4, 1.0] * p)
     lines, scales, prefix = no_lines(axes), Scales(dB, Hz, deg), legend_prefix(label)
     values, marks, phases = np.asarray(curve.frdata), _marked(curve), response_phase(curve)
-    exact = (
-        None
-        if reference is None or marks.size == 0
-        else np.asarray(descriptor_response(reference, curve.omega[marks]).frdata)
-    )
+    exact, of_marks = _exact(reference, curve.omega[marks])
+    give_first_of_each_kind([*of_curve, *of_marks])
     for i, j in product(range(p), range(m)):
         above, below = axes[2 * i, j], axes[2 * i + 1, j]
         phase = phases[i, j]
@@ -175,6 +176,16 @@ def bode_plot(
             lines[2 * i + 1, j] += below.plot(x[marks], scales.phase(on_branch(exact[i, j], phase, marks)), **style)
     dress_bode(axes, curve, sysdata, known, scales, grid=grid)
     return finished_plot(lines, axes, title, sysdata, own=ax is None)
+
+
+def _exact(
+    reference: SecondOrderModel | None, omega: FloatArray
+) -> tuple[npt.NDArray[Any] | None, list[RecordedWarning]]:
+    """Return what the descriptor form says at the marks, if there are any, and what it warns of."""
+    with recording_warnings() as told:
+        if reference is None or omega.size == 0:
+            return None, told
+        return np.asarray(descriptor_response(reference, omega).frdata), told
 
 
 def _curve(

@@ -7,7 +7,7 @@ from hypothesis import given
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, hydromount, mech2ss, mechss
-from halfdof_ctrl.base.errors import ParameterError, SignalNameError
+from halfdof_ctrl.base.errors import DataLimitWarning, ParameterError, SignalNameError
 from halfdof_ctrl.plots import bode_plot
 from halfdof_ctrl.systems.frequency import descriptor_response, frequency_response
 from halfdof_ctrl.systems.sampled_phase import continuous_phase
@@ -196,3 +196,11 @@ def test_needles_and_notches_of_undamped_structures_leave_the_axis() -> None:
         phase = np.asarray(line.get_ydata(), dtype=float)
         phase = phase[np.isfinite(phase)]
         assert (np.abs(phase + 90.0) <= 90.0 + 1e-6).all()
+
+
+def test_curve_and_marks_warn_once_of_what_entries_determine() -> None:
+    """A mass on a link of 1e12 N/m, whose node stands on 1 N/m: one cause, one warning."""
+    model = mechss(np.diag([0.0, 1.0]), np.diag([0.1, 0.0]), [[1e12 + 1, -1e12], [-1e12, 1e12]]).select("F_q1", "q1")
+    with pytest.warns(DataLimitWarning, match="determine the response of q1 to F_q1") as told:
+        bode_plot(model, [0.1, 0.7, 2.0])
+    assert len(told) == 1
