@@ -26,7 +26,10 @@ from halfdof_ctrl.reduction.dense.single_solve import (
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, CLOSE_GAP, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
 from halfdof_ctrl.reduction.method.loss import (
+    ASKED_STATES,
     NOTHING_LOST,
+    SAVED,
+    SPREAD,
     TEN_TIMES_DATA,
     Loss,
     loss_of,
@@ -41,9 +44,6 @@ from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, output_signal
 
 ENTRY_ROUNDING = 4 * EPS  #: what an entry of A is known to, of the terms that it came from
-ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
-SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
-SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 LOSS_LOOKED_AT = 1e-12  #: other coordinates are tried only where that much is lost indeed, whatever the bound says
 
 

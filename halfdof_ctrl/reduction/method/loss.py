@@ -69,6 +69,9 @@ LONG_ZERO = 1e-60  #: of what a channel could be: less is nothing in hundreds of
 UNDETERMINED = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
 SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
+ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
+SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
+SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,7 +111,7 @@ class Stored(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Measured:
+class Measured:
     """What k inputs do in p outputs at some points, (points, p, k) each."""
 
     missed: FloatArray  #: size of what is lost
@@ -125,7 +128,7 @@ class Measurement:
     model: SecondOrderModel
     chosen: IndexArray  #: (k,) which inputs
     slow: Slow  #: below which little is looked at
-    found: Sequence[tuple[ComplexArray, _Measured]]  #: points, and what is lost there
+    found: Sequence[tuple[ComplexArray, Measured]]  #: points, and what is lost there
 
 
 def measured_loss(stored: Stored) -> Loss:
@@ -157,7 +160,7 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     order = np.argsort(np.abs(at), kind="stable")
     at = at[order]
     missed, value, rounding, moved, grown = (
-        np.concatenate([getattr(part, what.name) for _, part in found])[order] for what in fields(_Measured)
+        np.concatenate([getattr(part, what.name) for _, part in found])[order] for what in fields(Measured)
     )
     own = np.maximum(value, grown)
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
@@ -276,7 +279,7 @@ class _Comparison:
         """Whether factors of P(s) itself answer."""
         return len(self.stored.model.dofs) <= FEW_DOFS
 
-    def tried(self, points: ComplexArray) -> list[tuple[ComplexArray, _Measured]]:
+    def tried(self, points: ComplexArray) -> list[tuple[ComplexArray, Measured]]:
         """Compare at some points but those that are eigenvalues, at which nothing is determined."""
         try:
             return [(points, self.at(points))]
@@ -284,7 +287,7 @@ class _Comparison:
             single = [points[k : k + 1] for k in range(points.size)] if points.size > 1 else []
             return [found for point in single for found in self.tried(point)]
 
-    def at(self, points: ComplexArray) -> _Measured:
+    def at(self, points: ComplexArray) -> Measured:
         """Compare at some points."""
         solver = StateSolver(self.stored.A, points)
         answer = pencil_solver(self.motion.R, points) if self.is_small else self._answers(solver)
@@ -303,7 +306,7 @@ class _Comparison:
         looked_for = settled & (missed > UNSETTLED * (true.rounding + said.rounding)) & (moved <= UNDETERMINED * value)
         missed = np.where(looked_for, missed, 0.0)
         parts = (missed, value, rounding, moved, grown)
-        return _Measured(*[np.moveaxis(part.reshape(shape), 1, 0) for part in parts])
+        return Measured(*[np.moveaxis(part.reshape(shape), 1, 0) for part in parts])
 
     def _settled(
         self, points: ComplexArray, said: Response, true: Response, grown: FloatArray

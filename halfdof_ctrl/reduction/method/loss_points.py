@@ -49,7 +49,11 @@ BESIDE_ZERO = 1e-3  #: of the mean size of the eigenvalues: where slow ones are 
 def loss_points(A: FloatArray) -> ComplexArray:
     """Choose points on the imaginary axis: beside the slowest oscillations and at the slowest real pole."""
     poles, bounds = _slow_eigenvalues(A)
-    moving = poles[np.abs(poles) > bounds]
+    return beside_modes(poles[np.abs(poles) > bounds])
+
+
+def beside_modes(moving: ComplexArray) -> ComplexArray:
+    """Choose points beside the slowest oscillations among some poles and at the slowest real one."""
     moving = moving[np.argsort(np.abs(moving))]
     swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
     chosen = np.concatenate([swinging[: MOST_FREQUENCIES - 1], real[:1]])

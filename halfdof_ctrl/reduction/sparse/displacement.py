@@ -102,6 +102,7 @@ class SparseDisplacement:
         self.equation, self.leading = equation, leading
         self.A, self.B, self.shift = A, B, shift
         self.sizes = sizes  #: (n_i + n_c,) what the rounding errors of the solved rows of A and B are relative to
+        self._found: tuple[SecondOrderModel, Signal] | None = None  #: the outputs that were asked for last
 
     @property
     def X(self) -> FloatArray:  # noqa: N802
@@ -166,6 +167,11 @@ class SparseDisplacement:
         ModelSizeError
             C or D of the state space would have more than 2^26 entries.
         """
+        if self._found is None or self._found[0] is not model:
+            self._found = model, self._output(model)
+        return self._found[1]
+
+    def _output(self, model: SecondOrderModel) -> Signal:
         (N, m), p = self.B.shape, model.D.shape[0]
         remedy = "Select the outputs and inputs that matter: model.select(inputs=[...], outputs=[...])."
         require_room(p, max(m, 1), "D", remedy)

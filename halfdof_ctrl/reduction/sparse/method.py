@@ -10,25 +10,41 @@ from functools import partial
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.errors import SingularLeadingMatrixError
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, has_even_entries
+from halfdof_ctrl.base.errors import ModelSizeError, SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
+from halfdof_ctrl.base.sparse_arrays import as_sparse
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
-from halfdof_ctrl.reduction.algebra.leading_matrix import plainly_regular
+from halfdof_ctrl.reduction.algebra.leading_matrix import LEAST_SIZE, SINGULAR_RCOND, plainly_regular
+from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, unit_free_scaling
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
-from halfdof_ctrl.reduction.method.evidence import Evidence, RankDecision
-from halfdof_ctrl.reduction.method.loss import NOTHING_LOST, Loss, measured_loss
+from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
+from halfdof_ctrl.reduction.method.loss import (
+    ASKED_STATES,
+    NOTHING_LOST,
+    SAVED,
+    SPREAD,
+    TEN_TIMES_DATA,
+    Loss,
+    is_well_conditioned,
+    loses_nothing,
+    loss_of,
+    measured_loss,
+)
+from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
-from halfdof_ctrl.reduction.method.signals import Signal
+from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
-from halfdof_ctrl.reduction.sparse.partition import SparsePartition
+from halfdof_ctrl.reduction.sparse.loss import measured_sparsely
+from halfdof_ctrl.reduction.sparse.partition import INERTIAL, SparsePartition
 from halfdof_ctrl.reduction.sparse.selection import has_dependent_columns, select_sparse_columns
 from halfdof_ctrl.reduction.sparse.single_solve import require_states, solved_by_rows, sparse_leading_columns
 
+ALWAYS_TOLD = 1e-6  #: part of a value: a larger loss is told of, whatever the entries determine
 DENSE_COPY_DOFS = 500  #: DOFs up to which a sparse model is reduced densely where a decision is near
 
 
@@ -145,7 +161,31 @@ def by_sparse_selection(model: SecondOrderModel, tol: float | None, *, asked: bo
     require_states(model, coordinates)
     if not asked and has_dependent_columns(model, coordinates):
         return None
-    return _solved(model, coordinates, asked=asked)
+    found = _solved(model, coordinates, asked=asked)
+    if found is None or asked or tol is not None or found.loss.value <= ALLOWED_LOSS:
+        return found
+    return _in_better_coordinates(found) or found
+
+
+def _in_better_coordinates(found: SparseSolve) -> SparseSolve | None:
+    """Give directions of little mass or damping coordinates of their own, where that keeps digits that DOFs lose.
+
+    With another number of states only where W of the DOFs is singular by the measure of dense models.
+    """
+    n = len(found.model.dofs)
+    if found.leading.rcond >= plainly_regular(n):
+        return None
+    try:
+        coordinates = sparse_bases(found.model, widest=SPREAD)
+    except ModelSizeError:
+        return None
+    if not any(decision.singular_values.size > 1 for decision in coordinates.evidence):
+        return None
+    other = _solved(found.model, coordinates, asked=False)
+    if other is None or not other.loss.value <= SAVED * found.loss.value:
+        return None
+    is_singular = found.leading.rcond < max(n, LEAST_SIZE) * SINGULAR_RCOND
+    return other if is_singular or len(other.A) == len(found.A) else None
 
 
 def by_sparse_bases(model: SecondOrderModel, tol: float | None, *, asked: bool) -> SparseSolve | None:
@@ -177,7 +217,47 @@ def _solved(model: SecondOrderModel, coordinates: SparsePartition, *, asked: boo
         return None
     displacement = solved_by_rows(model, coordinates, leading)
     found = SparseSolve(model=model, coordinates=coordinates, leading=leading, displacement=displacement)
-    return found if leading.rcond >= plainly_regular(n) else replace(found, loss=measured_loss(found))
+    if n > DENSE_COPY_DOFS:
+        return replace(found, loss=_lost(found))
+    if asked:
+        return found if leading.rcond >= plainly_regular(n) else replace(found, loss=measured_loss(found))
+    return found if _loses_nothing(found) else None
+
+
+def _lost(found: SparseSolve) -> Loss:
+    """Measure what is lost; what rounding of the entries of an ordinary structure does as well is a loss if it is much.
+
+    As the dense method does, which looks at no more than a few states of masses of similar sizes.
+    """
+    measurement = measured_sparsely(found)
+    loss = loss_of(measurement)
+    if not ALLOWED_LOSS < loss.value <= ALWAYS_TOLD or not _is_ordinary(found):
+        return loss
+    return loss_of(measurement, allowed=TEN_TIMES_DATA)
+
+
+def _is_ordinary(found: SparseSolve) -> bool:
+    """Return whether M, C and K are those of an ordinary structure in odd units, which lets no more digits be lost."""
+    if found.leading.rcond < plainly_regular(len(found.model.dofs)) or found.coordinates.columns is not None:
+        return False
+    if not spread_is_wide(found.model, found.coordinates.kinds == INERTIAL):
+        return True
+    parts = [as_sparse(part) for part in found.model.quadratics.P]
+    return all(
+        has_even_entries(unit_free_scaling(part, ROUGHLY_SETTLED).of_sparse(part).data) for part in parts if part.nnz
+    )
+
+
+def _loses_nothing(found: SparseSolve) -> bool:
+    """Tell by what the dense method asks as well whether nothing is lost of a small model."""
+    if len(found.A) > ASKED_STATES:
+        return not spread_is_wide(found.model, found.coordinates.kinds == INERTIAL)
+    try:
+        output = found.output(found.model)
+    except ModelSizeError:  # whoever asks for the outputs will hear of it
+        return True
+    equations = StateEquations(A=found.A, B=found.B, displacement=output, shift=found.shift)
+    return loses_nothing(found.model.as_dense(), equations, even=is_well_conditioned(found.A))
 
 
 def _singular_error(

@@ -1,0 +1,323 @@
+"""What the stored A, B, C, D of a sparse model lose, measured at the price of a few solutions.
+
+As `method.loss` does, by the residual (29), with sparse factors. Where P(s) is factorized at a point, it serves both
+responses: (s I - A) x = r, with rates r_p, r_c, r_v of inertial and half displacements and of velocities, is
+
+    P(s) q = M T_i (s r_p + r_v) + C T_i r_p + C T_c r_c,    v = s p_i - r_p,                       (30)
+
+as far as A is that of the model, which residuals correct, so that no matrix of many states is factorized. A large
+model with few states is looked at by its factors of W, and by one mixture of its inputs first.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.sparse import csc_array, eye_array
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
+
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, powers_of_two
+from halfdof_ctrl.base.exact_products import as_it_is
+from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
+from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
+from halfdof_ctrl.base.spectrum import balanced_states
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
+from halfdof_ctrl.reduction.algebra.sparse_lu import is_nearly_symmetric
+from halfdof_ctrl.reduction.method.loss import (
+    MOST_INPUTS,
+    SMALL_CHANNEL,
+    TRIED_ROUNDINGS,
+    UNSETTLED,
+    ZERO_CHANNEL,
+    Measured,
+    Measurement,
+    Stored,
+)
+from halfdof_ctrl.reduction.method.loss_points import ALL_EIGENVALUES, BESIDE_MODE, beside_modes, loss_points
+from halfdof_ctrl.reduction.method.masses import own_speeds
+from halfdof_ctrl.reduction.method.refined_answers import (
+    Equations,
+    Response,
+    Solver,
+    StateSolver,
+    refined_response,
+    sizes_at,
+    sizes_of_terms,
+)
+from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, SparsePartition
+
+MEASURED_STATES = 4000  #: if most entries of A are filled: of more, nothing is measured
+MOST_OUTPUTS = 32  #: that are looked at, spread over all
+FACTORIZED_DOFS = 5000  #: up to which P(s) is factorized at each point, whatever the number of states
+FEW_STATES = 300  #: of more, so it is in any case
+LARGE = 20_000  #: DOFs from which on few points are looked at, and a mixture of the inputs first
+FILLED = 2**18  #: entries of A, above which few points are looked at as well
+POINTS_OF_LARGE = 2  #: of many states; of few, one
+NOTHING_MOVES = 1e-200  #: of the largest unknown: smaller ones are zero, so that no power of two overflows
+LOOKED_CLOSER = 1e-10  #: part of a value from which more is asked about a loss
+STILL_KNOWN = 1e-3  #: part of a value: what is known to less is lost, or is asked of P(s) itself
+BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
+SLOW_MODES = 6  #: of many states, that are looked for
+SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
+NEARLY_FREE = 1e-14  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free
+BESIDE_ORIGIN = 1e-3  #: of the slowest frequency of a mass by itself: where slow modes are looked for if one is free
+REACHED = 16.0  #: times that: modes of larger size are not told from free ones there
+
+
+class SparselyStored(Stored, Protocol):
+    """A sparse reduction of n DOFs to N states."""
+
+    @property
+    def coordinates(self) -> SparsePartition:
+        """Which coordinates are inertial, half and static."""
+
+
+def measured_sparsely(stored: SparselyStored) -> Measurement:
+    """Compare a stored sparse system with its model at the frequencies that are looked at, for `loss_of` to judge.
+
+    Up to eight inputs and 32 outputs, spread over all.
+    """
+    model, N = stored.model, len(stored.A)
+    filled = np.count_nonzero(stored.A)
+    if not N or (N > MEASURED_STATES and filled > MEASURED_STATES**2):
+        return Measurement(model, np.zeros(0, dtype=np.intp), ())
+    model, m = _with_few_outputs(model), len(model.inputs)
+    large, by_W = len(model.dofs) > LARGE, len(model.dofs) > FACTORIZED_DOFS and N <= FEW_STATES
+    chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
+    comparison = _Comparison.of(stored, model, _picked(chosen, m), by_W=by_W)
+    points = comparison.points()
+    if large or filled > FILLED:
+        points = points[: 1 if by_W else POINTS_OF_LARGE]
+    if large and m > 1 and not _is_suspect(_Comparison.of(stored, model, _mixture(stored.B), by_W=by_W), points):
+        return Measurement(model, np.zeros(0, dtype=np.intp), ())
+    return Measurement(model, chosen, [(points[k : k + 1], comparison.at(s)) for k, s in enumerate(points.tolist())])
+
+
+def _is_suspect(comparison: "_Comparison", points: ComplexArray) -> bool:
+    """Return whether enough is lost of the response to a mixture of inputs to look at each."""
+    found = [comparison.at(s) for s in points.tolist()]
+    return any(bool((part.missed > LOOKED_CLOSER * part.value).any()) for part in found)
+
+
+def _with_few_outputs(model: SecondOrderModel) -> SecondOrderModel:
+    """Return a model with some of its outputs, where these are many."""
+    p = len(model.outputs)
+    if p <= MOST_OUTPUTS:
+        return model
+    places = np.linspace(0, p - 1, MOST_OUTPUTS).astype(np.intp)
+    return model.select(outputs=[model.outputs[place] for place in places.tolist()])
+
+
+def _picked(chosen: IndexArray, m: int) -> SparseMatrix:
+    """Return the columns of a unit matrix."""
+    ones = np.ones(chosen.size)
+    return csc_array((ones, (chosen, np.arange(chosen.size))), shape=(m, chosen.size))
+
+
+def _mixture(B: FloatArray) -> SparseMatrix:
+    """Return weights at random that make inputs act on the states in one size."""
+    size = np.abs(B).max(axis=0, initial=0.0)
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], size.size)
+    return csc_array((signs / np.where(size > 0.0, size, 1.0))[:, None])
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Comparison:
+    """A model and its stored state space in even units, for k inputs or mixtures of them."""
+
+    stored: SparselyStored
+    by_W: bool  #: whether W is what solves for all DOFs
+    scaling: Scaling  #: of the equations of motion
+    motion: Equations  #: of the model, scaled
+    states: Equations  #: of the state space, balanced
+    balance: FloatArray  #: (N,) what the balanced states are multiplied by
+
+    @classmethod
+    def of(cls, stored: SparselyStored, model: SecondOrderModel, mix: SparseMatrix, *, by_W: bool) -> "_Comparison":
+        N = len(stored.A)
+        speeds = own_speeds(model)
+        speed = float(np.sqrt(np.median(speeds[speeds > 0.0]))) if (speeds > 0.0).any() else 1.0
+        P = [as_sparse(part) for part in model.quadratics.P]
+        scaling = max_scaling(csc_array(sizes_at(P, speed)), even=2.0)
+        rows, columns = scaling
+        B = [rows[:, None] * _dense(as_sparse(part) @ mix) for part in model.quadratics.B]
+        inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
+        seen = Scaling(np.ones(len(model.outputs)), columns)
+        motion = Equations(
+            R=[scaling.of_sparse(part) for part in P],
+            B=[part * inputs for part in B],
+            C=[seen.of_sparse(as_sparse(part)) for part in model.quadratics.F],
+            D=[_dense(as_sparse(part) @ mix) * inputs for part in model.quadratics.D],
+        )
+        (A, balance), output = balanced_states(stored.A), stored.output(model)
+        into = np.asarray(stored.B @ mix) * inputs / balance[:, None]
+        direct = [np.asarray(part @ mix) * inputs for part in output.U] or [np.zeros((len(output.X), inputs.size))]
+        states = Equations(
+            R=[as_it_is(-A), csc_array(eye_array(N))],
+            B=[into, np.zeros_like(into)],
+            C=[output.X * balance, *[np.zeros_like(output.X) for _ in direct[1:]]],
+            D=direct,
+        )
+        return cls(stored=stored, by_W=by_W, scaling=scaling, motion=motion, states=states, balance=balance)
+
+    def points(self) -> ComplexArray:
+        """Choose points, those first that tell most: beside the slowest modes, and up to where masses swing alone."""
+        A, speeds = self.stored.A, own_speeds(self.stored.model)
+        if self.by_W or len(A) <= ALL_EIGENVALUES:
+            return loss_points(A)
+        slow = beside_modes(self._slow_modes(speeds))
+        if not (speeds > 0.0).any():
+            return slow
+        least, typical = np.sqrt(np.quantile(speeds[speeds > 0.0], (0.0, 0.5)))
+        between: Any = (
+            np.geomspace(np.abs(slow).min(), typical, BETWEEN + 2)[1:-1] if np.abs(slow).min() < typical else []
+        )
+        return np.concatenate(
+            [slow[:1], slow[1:][-1:], 1j * BESIDE_MODE * np.array([typical, *between, least]), slow[1:-1]]
+        )
+
+    def _slow_modes(self, speeds: FloatArray) -> ComplexArray:
+        """Return the slowest poles to a few digits, but those of free motions."""
+        N, shift, least = len(self.stored.A), 0.0, 0.0
+        try:
+            motion = self._pencil(0.0)
+            grown = np.abs(
+                motion(np.random.default_rng(0).uniform(1.0, 2.0, (len(self.scaling.rows), 1)).astype(np.complex128))
+            ).max()
+            is_free = not NEARLY_FREE * grown < 1.0
+        except np.linalg.LinAlgError:
+            is_free = True
+        if is_free:
+            slowest = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
+            shift = -BESIDE_ORIGIN * slowest
+            least = REACHED * EPS**0.5 * slowest
+            motion = self._pencil(shift)
+        solve = lifted(self.stored, self._physical(motion), shift)
+        turned = LinearOperator(
+            (N, N),
+            matvec=lambda v: (
+                (solve((self.balance * v.ravel()).astype(np.complex128)[:, None])[:, 0] / self.balance).real
+            ),
+            dtype=np.float64,
+        )
+        start = np.random.default_rng(0).standard_normal(N)
+        try:
+            found = eigs(turned, k=min(SLOW_MODES, N - 2), v0=start, tol=SLOW_MODES_ACCURACY, return_eigenvectors=False)
+        except ArpackNoConvergence as some:
+            found = np.asarray(some.eigenvalues)
+        except ArpackError:
+            found = np.zeros(0, dtype=complex)
+        poles = np.asarray(shift - 1.0 / found[found != 0.0], dtype=np.complex128)
+        return poles[np.abs(poles) > least]
+
+    def at(self, s: complex) -> Measured:
+        """Compare at a point."""
+        k = self.states.B[0].shape[1]
+        points, u = np.full(k, s), np.eye(k, dtype=np.complex128)
+        try:
+            answer, solve = self._solvers(s)
+            said = refined_response(self.states, solve, points, u)
+            true = refined_response(self.motion, answer, points, u)
+            if self.by_W and _is_lost(true).any():
+                answer = self._pencil(s)
+                true = refined_response(self.motion, answer, points, u)
+        except np.linalg.LinAlgError:  # an eigenvalue, at which nothing is determined
+            none = np.zeros((len(self.states.D[0]), k))
+            return Measured(*[none[None]] * 5)
+        value, missed = np.abs(true.y), np.abs(true.y - said.y)
+        known = UNSETTLED * (true.rounding + said.rounding)
+        missed = np.where((missed > known) | (_is_lost(said) & ~_is_lost(true)), missed, 0.0)
+        moved = np.zeros(missed.shape)
+        if (missed > LOOKED_CLOSER * value).any():
+            moved = self._undetermined(answer, points, true)
+        rounding, small, most = ZERO_CHANNEL * true.rounding, SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
+        rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
+        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], points, u)
+        return Measured(*[part[None] for part in (missed, value, rounding, moved, grown)])
+
+    def _solvers(self, s: complex) -> tuple[Solver, Solver]:
+        """Return what answers for all DOFs, scaled, and for the balanced states."""
+        if self.by_W:
+            solver = StateSolver(self.stored.A, s)
+            return partial(self._answer, solver), solver.balanced_solve
+        motion = self._pencil(s)
+        solve, balance = lifted(self.stored, self._physical(motion), s), self.balance[:, None]
+        return motion, lambda right: _without_dust(solve(balance * right) / balance)
+
+    def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
+        rows, columns = self.scaling
+        return np.asarray(self.stored.answer(states, force / rows[:, None]) / columns[:, None])
+
+    def _physical(self, motion: Solver) -> Solver:
+        """Return the same in the units of the model."""
+        rows, columns = (part[:, None] for part in self.scaling)
+        return lambda force: np.asarray(columns * motion(rows * force))
+
+    def _pencil(self, s: complex) -> Solver:
+        """Factorize the scaled P(s).
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            It is exactly singular.
+        """
+        parts: list[Any] = [part.astype(np.complex128) for part in self.motion.R]
+        matrix = csc_array(parts[0] + s * parts[1] + s**2 * parts[2])
+        way = PIVOTINGS[1 if is_nearly_symmetric(matrix) else -1]
+        try:
+            factors = sparse_lu(matrix, *way)
+        except RuntimeError as singular:
+            msg = "s is an eigenvalue"
+            raise np.linalg.LinAlgError(msg) from singular
+        return lambda right: _without_dust(factors.solve(np.asarray(right, dtype=np.complex128)))
+
+    def _undetermined(self, answer: Solver, s: ComplexArray, true: Response) -> FloatArray:
+        """Return what rounding of M, C, K at random changes in the outputs."""
+        terms, generator = sizes_of_terms(self.motion.R, s, true.x), np.random.default_rng(0)
+        forces = [EPS * terms * generator.uniform(-1.0, 1.0, terms.shape) for _ in range(TRIED_ROUNDINGS)]
+        changes = [np.abs(self.motion.seen(s, answer(force.astype(np.complex128)))) for force in forces]
+        return np.asarray(np.max(changes, axis=0))
+
+
+def lifted(stored: SparselyStored, motion: Solver, s: complex) -> Solver:
+    """Return ``(s I - A)^-1`` by what solves ``P(s) q = f``, equation (30)."""
+    model, part = stored.model, stored.coordinates
+    inertial, half = part.of_kind(INERTIAL), part.of_kind(HALF)
+    n_i, moving = inertial.size, inertial.size + half.size
+    M_i = part.mapped(as_sparse(model.M), inertial)
+    C_i, C_c = (part.mapped(as_sparse(model.C), own) for own in (inertial, half))
+    coordinates = _coordinates(part)
+
+    def solve(rates: ComplexArray) -> ComplexArray:
+        r_p, r_c, r_v = rates[:n_i], rates[n_i:moving], rates[moving:]
+        force = np.asarray(M_i @ (s * r_p + r_v)) + np.asarray(C_i @ r_p) + np.asarray(C_c @ r_c)
+        p = coordinates(motion(force))[:moving]
+        return np.concatenate([p, s * p[:n_i] - r_p])
+
+    return solve
+
+
+def _coordinates(part: SparsePartition) -> Callable[[ComplexArray], ComplexArray]:
+    """Return what takes displacements of all DOFs to coordinates."""
+    if part.columns is None:
+        return lambda q: np.asarray(q[part.order])
+    factors: Any = sparse_lu(part.columns)
+    return lambda q: np.asarray((factors.solve(q.real.copy()) + 1j * factors.solve(q.imag.copy()))[part.order])
+
+
+def _without_dust(solution: Any) -> ComplexArray:  # noqa: ANN401  # SuperLU has no public type
+    """Return a solution, far from where forces act, with zeros for what is next to nothing."""
+    largest = np.abs(solution).max(axis=0, initial=0.0)
+    return np.asarray(np.where(np.abs(solution) <= NOTHING_MOVES * largest, 0.0, solution), dtype=np.complex128)
+
+
+def _is_lost(response: Response) -> Any:  # noqa: ANN401  # an array of bool
+    """Return which values are hardly known."""
+    return ~(response.rounding <= STILL_KNOWN * np.abs(response.y))
+
+
+def _dense(product: Any) -> FloatArray:  # noqa: ANN401  # sparse
+    return np.asarray(product.toarray())
