@@ -8,7 +8,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray
-from halfdof_ctrl.base.double_double import matrix_product
+from halfdof_ctrl.base.double_double import BITS, matrix_product
 from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, has_short_entries, least_rank
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, gap_threshold, unit_free_scaling
 
@@ -17,6 +17,7 @@ ENTRY_NOISE = 2 * EPS  #: times the block's size and its largest singular value:
 UNNOTICED = 4 * EPS  #: times the block's size: an entry of a vector of length one below that is rounding of a zero
 NULL_CORRECTIONS = 2  #: of null vectors, each by a residual in twice the working precision
 UNCLEAR_RANK = 1e3  #: singular values above that and below this times it are split at the widest gap
+FEWEST_SPARE_BITS = 20  #: zero bits at the end of numbers that, all together, are no chance of rounded ones
 CANCELLATION = 16 * EPS  #: times n: entries of C T and the like below this part of their terms are zero
 
 
@@ -76,7 +77,14 @@ def _hides_rank(block: FloatArray, rank: int) -> bool:
     """Return whether the entries of a small block were not rounded and have a higher rank than counts."""
     if rank == min(block.shape) or max(block.shape) > LARGEST_EXACT or not has_short_entries(block):
         return False
-    return least_rank(block) > rank
+    return _spare_bits(block) >= FEWEST_SPARE_BITS and least_rank(block) > rank
+
+
+def _spare_bits(block: FloatArray) -> float:
+    """Return how many bits at the end of the numbers of a block are zero, equal ones counted once."""
+    sizes = np.unique(np.abs(block[block != 0.0]))
+    whole = np.ldexp(np.frexp(sizes)[0], BITS).astype(np.int64)
+    return float(np.log2((whole & -whole).astype(float)).sum())
 
 
 def _null_columns(

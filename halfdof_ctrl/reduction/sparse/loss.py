@@ -9,7 +9,7 @@ as far as A is that of the model, which residuals correct, so that no matrix of 
 model with few states is looked at by its factors of W, and by one mixture of its inputs first.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol
@@ -74,6 +74,9 @@ class SparselyStored(Stored, Protocol):
     def coordinates(self) -> SparsePartition:
         """Which coordinates are inertial, half and static."""
 
+    def motion_at(self, x: FloatArray, inputs: Sequence[FloatArray], derivative: int) -> FloatArray:
+        """Return a derivative of all DOFs for given states and inputs."""
+
 
 def measured_sparsely(stored: SparselyStored) -> Measurement:
     """Compare a stored sparse system with its model at the frequencies that are looked at, for `loss_of` to judge.
@@ -87,19 +90,21 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
     model, m = _with_few_outputs(model), len(model.inputs)
     large, by_W = len(model.dofs) > LARGE, len(model.dofs) > FACTORIZED_DOFS and N <= FEW_STATES
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
-    comparison = _Comparison.of(stored, model, _picked(chosen, m), by_W=by_W)
+    first = _mixture(stored.B) if large else _picked(chosen, m)
+    comparison = _Comparison.of(stored, model, first, by_W=by_W)
     points = comparison.points()
     if large or filled > FILLED:
         points = points[: 1 if by_W else POINTS_OF_LARGE]
-    if large and m > 1 and not _is_suspect(_Comparison.of(stored, model, _mixture(stored.B), by_W=by_W), points):
-        return Measurement(model, np.zeros(0, dtype=np.intp), ())
+    if large:
+        if not _is_suspect(comparison, points):
+            return Measurement(model, np.zeros(0, dtype=np.intp), ())
+        comparison = _Comparison.of(stored, model, _picked(chosen, m), by_W=by_W)
     return Measurement(model, chosen, [(points[k : k + 1], comparison.at(s)) for k, s in enumerate(points.tolist())])
 
 
-def _is_suspect(comparison: "_Comparison", points: ComplexArray) -> bool:
-    """Return whether enough is lost of the response to a mixture of inputs to look at each."""
-    found = [comparison.at(s) for s in points.tolist()]
-    return any(bool((part.missed > LOOKED_CLOSER * part.value).any()) for part in found)
+def _is_suspect(mixture: "_Comparison", points: ComplexArray) -> bool:
+    """Return whether enough of the response to a mixture of inputs may be lost to look at each."""
+    return any(mixture.differs(s) if mixture.by_W else mixture.loses(s) for s in points.tolist())
 
 
 def _with_few_outputs(model: SecondOrderModel) -> SecondOrderModel:
@@ -134,6 +139,7 @@ class _Comparison:
     motion: Equations  #: of the model, scaled
     states: Equations  #: of the state space, balanced
     balance: FloatArray  #: (N,) what the balanced states are multiplied by
+    inputs: FloatArray  #: (m, k) the inputs that the columns stand for
 
     @classmethod
     def of(cls, stored: SparselyStored, model: SecondOrderModel, mix: SparseMatrix, *, by_W: bool) -> "_Comparison":
@@ -161,7 +167,15 @@ class _Comparison:
             C=[output.X * balance, *[np.zeros_like(output.X) for _ in direct[1:]]],
             D=direct,
         )
-        return cls(stored=stored, by_W=by_W, scaling=scaling, motion=motion, states=states, balance=balance)
+        return cls(
+            stored=stored,
+            by_W=by_W,
+            scaling=scaling,
+            motion=motion,
+            states=states,
+            balance=balance,
+            inputs=_dense(mix) * inputs,
+        )
 
     def points(self) -> ComplexArray:
         """Choose points, those first that tell most: beside the slowest modes, and up to where masses swing alone."""
@@ -212,6 +226,34 @@ class _Comparison:
             found = np.zeros(0, dtype=complex)
         poles = np.asarray(shift - 1.0 / found[found != 0.0], dtype=np.complex128)
         return poles[np.abs(poles) > least]
+
+    def loses(self, s: complex) -> bool:
+        """Return whether something is lost at a point."""
+        found = self.at(s)
+        return bool((found.missed > LOOKED_CLOSER * found.value).any())
+
+    def differs(self, s: complex) -> bool:
+        """Return whether the motion that the reduction recovers leaves forces, rounding among them, that are seen.
+
+        Without sums in twice the working precision, which would take longer than the solutions.
+        """
+        solver, columns = StateSolver(self.stored.A, s), self.scaling.columns[:, None]
+        point = np.full(self.inputs.shape[1], s)
+        x = solver.balanced_solve(self.states.B[0].astype(np.complex128))
+        physical, powers = self.balance[:, None] * x, range(len(self.motion.B))
+        parts = [
+            self.stored.motion_at(side(physical), [side(s**k * self.inputs) for k in powers], 0)
+            for side in (np.real, np.imag)
+        ]
+        q = np.asarray((parts[0] + 1j * parts[1]) / columns)
+        force = np.asarray(sum(s**k * part for k, part in enumerate(self.motion.B)))
+        left = force - np.asarray(sum(np.asarray(part @ (s**k * q)) for k, part in enumerate(self.motion.R)))
+        missed = self._answer(solver, left)
+        said = self.states.seen(point, x) + sum(s**k * part for k, part in enumerate(self.states.D))
+        true = self.motion.seen(point, q + missed) + sum(s**k * part for k, part in enumerate(self.motion.D))
+        every = np.broadcast_to(np.abs(q).max(axis=0, initial=0.0), q.shape)
+        told = np.abs(true) > ZERO_CHANNEL * EPS * self.motion.sizes(point, every)
+        return bool((told & ~(np.abs(true - said) <= LOOKED_CLOSER * np.abs(true))).any())
 
     def at(self, s: complex) -> Measured:
         """Compare at a point."""
