@@ -57,6 +57,8 @@ class ScaledPencil:
 
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""
+        if not np.isfinite(A).all():
+            return False
         fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
         beyond = 1 + math.frexp(max(fastest, 1.0))[1]  # powers of two, so that P(s) can be formed exactly
         points = [*NEAR_POINTS, *(2.0**power for power in (beyond, beyond + 1))]

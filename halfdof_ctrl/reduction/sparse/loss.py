@@ -62,7 +62,7 @@ STILL_KNOWN = 1e-3  #: part of a value: what is known to less is lost, or is ask
 BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
 SLOW_MODES = 6  #: of many states, that are looked for
 SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
-NEARLY_FREE = 1e-14  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free
+NEARLY_FREE = 1e-15  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free
 BESIDE_ORIGIN = 1e-3  #: of the slowest frequency of a mass by itself: where slow modes are looked for if one is free
 REACHED = 16.0  #: times that: modes of larger size are not told from free ones there
 
