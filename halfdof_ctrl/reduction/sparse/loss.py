@@ -3,7 +3,7 @@
 As `method.loss` does, by the residual (29), with sparse factors. Where P(s) is factorized at a point, it serves both
 responses: (s I - A) x = r, with rates r_p, r_c, r_v of inertial and half displacements and of velocities, is
 
-    P(s) q = M T_i (s r_p + r_v) + C T_i r_p + C T_c r_c,    v = s p_i - r_p,                       (30)
+    P(s) q = M T_i (s r_p + r_v) + C T_i r_p + C T_c r_c,    v = s p_i - r_p,
 
 as far as A is that of the model, which residuals correct, so that no matrix of many states is factorized. A large
 model with few states is looked at by its factors of W, and by one mixture of its inputs first.
@@ -58,6 +58,7 @@ FILLED = 2**18  #: entries of A, above which few points are looked at as well
 POINTS_OF_LARGE = 2  #: of many states; of few, one
 NOTHING_MOVES = 1e-200  #: of the largest unknown: smaller ones are zero, so that no power of two overflows
 LOOKED_CLOSER = 1e-10  #: part of a value from which more is asked about a loss
+UNKNOWN = 1e-9  #: part of a value that is no small part of its terms: what is known to less is not told from a loss
 STILL_KNOWN = 1e-3  #: part of a value: what is known to less is lost, or is asked of P(s) itself
 BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
 SLOW_MODES = 6  #: of many states, that are looked for
@@ -270,8 +271,10 @@ class _Comparison:
             none = np.zeros((len(self.states.D[0]), k))
             return Measured(*[none[None]] * 5)
         value, missed = np.abs(true.y), np.abs(true.y - said.y)
-        known = UNSETTLED * (true.rounding + said.rounding)
-        missed = np.where((missed > known) | (_is_lost(said) & ~_is_lost(true)), missed, 0.0)
+        told = missed > UNSETTLED * (true.rounding + said.rounding)
+        told |= _is_lost(said) & ~_is_lost(true)
+        told |= (true.rounding > UNKNOWN * value) & (value > SMALL_CHANNEL * true.shown)  # the best that is known
+        missed = np.where(told, missed, 0.0)
         moved = np.zeros(missed.shape)
         if (missed > LOOKED_CLOSER * value).any():
             moved = self._undetermined(answer, points, true)
@@ -325,7 +328,7 @@ class _Comparison:
 
 
 def lifted(stored: SparselyStored, motion: Solver, s: complex) -> Solver:
-    """Return ``(s I - A)^-1`` by what solves ``P(s) q = f``, equation (30)."""
+    """Return ``(s I - A)^-1`` by what solves ``P(s) q = f``."""
     model, part = stored.model, stored.coordinates
     inertial, half = part.of_kind(INERTIAL), part.of_kind(HALF)
     n_i, moving = inertial.size, inertial.size + half.size
