@@ -2,13 +2,15 @@
 
 import numpy as np
 import numpy.typing as npt
-from scipy.sparse import csc_array, hstack
+from scipy.sparse import csc_array, diags_array, hstack
 
 from halfdof_ctrl.base.arrays import ModelMatrix, as_dense
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
-from halfdof_ctrl.base.sparse_factors import structural_rank
+from halfdof_ctrl.base.sparse_factors import sparse_lu, structural_rank
 
-LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` ranks no numbers of W, but the pattern of a sparse one
+LARGEST_RANKED_REPR = 500  #: above so many DOFs `repr` ranks no numbers of W, but factorizes a sparse one, ...
+LARGEST_FACTORIZED_REPR = 20_000  #: ... and above so many it looks at its pattern alone
+SINGULAR_GROWTH_REPR = 1e14  #: of a random solution, above which W, scaled, is singular
 
 
 def null_column_kinds(M: ModelMatrix, C: ModelMatrix) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -32,9 +34,25 @@ def split_in_words(M: ModelMatrix, C: ModelMatrix, K: ModelMatrix) -> str:
         size = np.abs(leading).max(axis=0)
         if not size.all() or np.linalg.matrix_rank(leading / size) < n:
             return f"{kinds} {insufficient}"
-    elif is_sparse(K) and structural_rank(_leading_columns(M, C, K, inertial, half)) < n:
+    elif is_sparse(K) and _is_singular(_leading_columns(M, C, K, inertial, half)):
         return f"{kinds} {insufficient}"
     return f"{kinds}; {2 * n_inertial + n_half} states"
+
+
+def _is_singular(leading: csc_array) -> bool:
+    """Tell whether W is singular: by its pattern, and where that takes no time by what its factors make of a vector."""
+    n = leading.shape[0]
+    if structural_rank(leading) < n or n > LARGEST_FACTORIZED_REPR:
+        return structural_rank(leading) < n
+    for axis in (0, 1):
+        size = abs(leading).max(axis=axis).toarray().ravel()
+        scale = diags_array(1.0 / np.where(size > 0.0, size, 1.0))
+        leading = csc_array(leading @ scale if axis == 0 else scale @ leading)
+    try:
+        solution = sparse_lu(leading).solve(np.random.default_rng(0).uniform(1.0, 2.0, n).astype(leading.dtype))
+    except RuntimeError:  # exactly singular
+        return True
+    return not float(np.abs(solution).max(initial=0.0)) < SINGULAR_GROWTH_REPR
 
 
 def _leading_columns(

@@ -182,6 +182,19 @@ def test_repr_of_a_large_sparse_model_knows_that_a_constraint_takes_states() -> 
     assert "600 inertial, 0 half, 1 static by null columns, which do not suffice here" in repr(tied)
 
 
+@pytest.mark.parametrize("loss", [1.0, 1.0 + 0.1j])
+def test_repr_of_a_large_sparse_model_knows_that_a_damper_between_two_nodes_is_one_state(loss: complex) -> None:
+    """The pattern of W is that of a regular matrix, its numbers are not: 600 nodes in a row, two of them damped."""
+    n = 600
+    stiffness = csc_array(loss * (2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)))
+    damping = np.zeros((n, n))
+    damping[np.ix_([4, 5], [4, 5])] = [[0.3, -0.3], [-0.3, 0.3]]
+    between = mechss(None, csc_array(damping), stiffness)
+    assert "0 inertial, 2 half, 598 static by null columns, which do not suffice here" in repr(between)
+    damping[4, 4] = 0.7
+    assert "0 inertial, 2 half, 598 static; 2 states" in repr(mechss(None, csc_array(damping), stiffness))
+
+
 def test_models_are_compared_by_identity() -> None:
     """A generated comparison of arrays would raise; two models are never silently equal."""
     assert hydromount() != hydromount()
