@@ -32,6 +32,7 @@ SIGNAL_SIZES = (1e-200, 1e200)  #: the same of B, F and D, which enter a product
 SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer digits
 EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of a matrix up to which they are of similar sizes
 FEW_COMPARED = 400  #: of a matrix, up to which they are compared as plain numbers, which takes a microsecond
+LARGEST_EXPONENT = 1023  #: of a power of two
 SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
 
 
@@ -258,7 +259,7 @@ def unit_matrix(size: int) -> FloatArray:
 
 def powers_of_two(size: FloatArray) -> FloatArray:
     """Powers of two that bring sizes to between 1/2 and 1, and 1 for a zero."""
-    return np.asarray(np.ldexp(1.0, -np.frexp(size)[1]))
+    return np.asarray(np.ldexp(1.0, np.minimum(-np.frexp(size)[1], LARGEST_EXPONENT)))
 
 
 def has_even_entries(matrix: FloatArray) -> bool:
