@@ -36,7 +36,7 @@ from halfdof_ctrl.reduction.method.loss import (
     Measurement,
     Stored,
 )
-from halfdof_ctrl.reduction.method.loss_points import ALL_EIGENVALUES, BESIDE_MODE, beside_modes, loss_points
+from halfdof_ctrl.reduction.method.loss_points import ALL_EIGENVALUES, BESIDE_MODE, Slow, beside_modes, loss_points
 from halfdof_ctrl.reduction.method.masses import own_speeds
 from halfdof_ctrl.reduction.method.refined_answers import (
     Equations,
@@ -49,6 +49,7 @@ from halfdof_ctrl.reduction.method.refined_answers import (
 )
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, SparsePartition
 
+NOTHING_SLOW = Slow(0.0, 0.0)  #: no point is below what moves
 MEASURED_STATES = 4000  #: if most entries of A are filled: of more, nothing is measured
 MOST_OUTPUTS = 32  #: that are looked at, spread over all
 FACTORIZED_DOFS = 5000  #: up to which P(s) is factorized at each point, whatever the number of states
@@ -87,7 +88,7 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
     model, N = stored.model, len(stored.A)
     filled = np.count_nonzero(stored.A)
     if not N or (N > MEASURED_STATES and filled > MEASURED_STATES**2):
-        return Measurement(model, np.zeros(0, dtype=np.intp), ())
+        return Measurement(model, np.zeros(0, dtype=np.intp), NOTHING_SLOW, ())
     model, m = _with_few_outputs(model), len(model.inputs)
     large, by_W = len(model.dofs) > LARGE, len(model.dofs) > FACTORIZED_DOFS and N <= FEW_STATES
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
@@ -98,9 +99,11 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
         points = points[: 1 if by_W else POINTS_OF_LARGE]
     if large:
         if not _is_suspect(comparison, points):
-            return Measurement(model, np.zeros(0, dtype=np.intp), ())
+            return Measurement(model, np.zeros(0, dtype=np.intp), NOTHING_SLOW, ())
         comparison = _Comparison.of(stored, model, _picked(chosen, m), by_W=by_W)
-    return Measurement(model, chosen, [(points[k : k + 1], comparison.at(s)) for k, s in enumerate(points.tolist())])
+    return Measurement(
+        model, chosen, NOTHING_SLOW, [(points[k : k + 1], comparison.at(s)) for k, s in enumerate(points.tolist())]
+    )
 
 
 def _is_suspect(mixture: "_Comparison", points: ComplexArray) -> bool:
@@ -294,7 +297,7 @@ class _Comparison:
 
     def _answer(self, states: StateSolver, force: ComplexArray) -> ComplexArray:
         rows, columns = self.scaling
-        return np.asarray(self.stored.answer(states, force / rows[:, None]) / columns[:, None])
+        return np.asarray(self.stored.answers(states)(force / rows[:, None]) / columns[:, None])
 
     def _physical(self, motion: Solver) -> Solver:
         """Return the same in the units of the model."""

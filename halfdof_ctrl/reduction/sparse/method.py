@@ -14,10 +14,11 @@ from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, has_even_entries
 from halfdof_ctrl.base.errors import ModelSizeError, SingularLeadingMatrixError
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.base.sparse_arrays import as_sparse
+from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.base.threads import limited_threads
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
-from halfdof_ctrl.reduction.algebra.leading_matrix import LEAST_SIZE, SINGULAR_RCOND, plainly_regular
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, LEAST_SIZE, SINGULAR_RCOND, plainly_regular
 from halfdof_ctrl.reduction.algebra.scaling import ROUGHLY_SETTLED, unit_free_scaling
 from halfdof_ctrl.reduction.algebra.sparse_lu import SparseLU
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
@@ -28,15 +29,14 @@ from halfdof_ctrl.reduction.method.loss import (
     SPREAD,
     TEN_TIMES_DATA,
     Loss,
-    is_well_conditioned,
-    loses_nothing,
     loss_of,
     measured_loss,
 )
+from halfdof_ctrl.reduction.method.loss_bound import EVEN_STATES, is_well_conditioned
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
-from halfdof_ctrl.reduction.method.signals import Signal, StateEquations
+from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
 from halfdof_ctrl.reduction.sparse.loss import measured_sparsely
@@ -249,15 +249,27 @@ def _is_ordinary(found: SparseSolve) -> bool:
 
 
 def _loses_nothing(found: SparseSolve) -> bool:
-    """Tell by what the dense method asks as well whether nothing is lost of a small model."""
-    if len(found.A) > ASKED_STATES:
-        return not spread_is_wide(found.model, found.coordinates.kinds == INERTIAL)
+    """Tell whether nothing is lost of a small model; whatever is no plain case is left to its dense copy."""
+    model, N = found.model, len(found.A)
+    if N > ASKED_STATES:
+        return not spread_is_wide(model, found.coordinates.kinds == INERTIAL)
+    parts = [as_sparse(part) for part in model.quadratics.P]
+    others = (*model.quadratics.F[1:], *model.quadratics.D)
+    if not N or found.shift or any(as_sparse(part).nnz for part in others):
+        return not N
+    if len(model.dofs) <= FEW_DOFS and not all(has_even_entries(part.data) for part in parts):
+        return False
+    A, scale = balanced_states(found.A)
+    if not is_well_conditioned(A):
+        return False
     try:
-        output = found.output(found.model)
+        output = found.output(model)
     except ModelSizeError:  # whoever asks for the outputs will hear of it
         return True
-    equations = StateEquations(A=found.A, B=found.B, displacement=output, shift=found.shift)
-    return loses_nothing(found.model.as_dense(), equations, even=is_well_conditioned(found.A))
+    x = scale[:, None] * np.linalg.solve(A, found.B / scale[:, None])
+    direct = output.direct(found.B.shape[1])
+    terms = (np.abs(output.X) @ np.abs(x) + np.abs(direct)).max(axis=0, initial=0.0)
+    return bool((terms <= EVEN_STATES * np.abs(direct - output.X @ x).max(axis=0, initial=0.0)).all())
 
 
 def _singular_error(
