@@ -89,13 +89,15 @@ class DofPartition:
     def times_basis(self, matrix: DenseMatrix, first: int, stop: int | None) -> FloatArray:
         """Return the columns from `first` to before `stop` of ``matrix T``, for a matrix with n columns.
 
-        Entries that are rounding of a sum whose terms cancel are zero.
+        Entries that are rounding of a sum whose terms cancel are zero. How well T spans the null spaces is no matter
+        here: (3) holds for the T that there is, and an entry that its null vectors leave is one of the model.
         """
         if self.in_order:
             return matrix[:, first:stop]
-        if self.basis is None or self.sizes is None:
+        if self.basis is None:
             return np.asarray(matrix[:, self.order[first:stop]])
-        return cancelled(matrix, self.basis[:, first:stop], self.sizes[:, first:stop])
+        basis = self.basis[:, first:stop]
+        return cancelled(matrix, basis, np.abs(basis))
 
     def from_static(self, static: Numbers) -> Numbers:
         """Return ``T_k p_k``, (n, k), for static coordinates p_k, (n_k, k)."""

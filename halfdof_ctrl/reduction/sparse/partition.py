@@ -157,8 +157,8 @@ class SparsePartition:
     def mapped(self, matrix: SparseMatrix, which: IndexArray | None = None) -> SparseMatrix:
         """Return ``matrix T``, for n columns, or those of its columns that `which` picks.
 
-        Entries that are rounding of a sum whose terms cancel are zero. Only the columns of T that are mixed are
-        multiplied: the others leave those of the matrix as they are.
+        Entries that are rounding of a sum whose terms cancel are zero; T is what it is here, however well it is known.
+        Only the columns of T that are mixed are multiplied: the others leave those of the matrix as they are.
         """
         product = matrix if which is None else csc_array(matrix[:, which])
         if self.columns is None or self.sizes is None:
@@ -167,7 +167,8 @@ class SparsePartition:
         mixed = np.flatnonzero(~self._unit_columns[places])
         if mixed.size == 0:
             return product
-        own = cancelled(matrix, self.columns[:, places[mixed]], self.sizes[:, places[mixed]])
+        columns = self.columns[:, places[mixed]]
+        own = cancelled(matrix, columns, abs(columns))
         lengths = np.zeros(places.size, dtype=own.indptr.dtype)
         lengths[mixed] = np.diff(own.indptr)
         starts = np.concatenate([own.indptr[:1], np.cumsum(lengths, dtype=own.indptr.dtype)])

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.sparse import csc_array
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, hydromount, mech2ss, mechss
 from halfdof_ctrl.base.errors import HalfdofWarning, NearlyMasslessWarning
@@ -21,6 +22,7 @@ from support.structures import Structure, structures
 ORTHOGONAL = 1e-12  # products of orthonormal vectors with small integer matrices, n <= 12
 THERE_AND_BACK = 1e-10  # T of up to 12 mixed columns, scaled by powers of two, has a condition of up to 1e5
 ROUNDOFF = 1e-12  # small well-conditioned matrices
+WEAK_TIE = 1e-6  # a mass of 2^-27 costs eight digits of A, of sixteen
 SAME = 1e-6  # the same number in other units; the scaling behind it is iterated
 
 
@@ -242,3 +244,23 @@ def test_tolerance_decides_ranks_of_mixed_blocks() -> None:
     model = mechss(rotation @ np.diag([1.0, 1e-9]) @ rotation.T, np.eye(2), np.eye(2))
     assert orthonormal_bases(model).n_inertial == 2
     assert orthonormal_bases(model, tol=1e-6).n_inertial == 1
+
+
+@pytest.mark.parametrize("stored", ["dense", "sparse"])
+def test_a_weak_tie_to_a_null_direction_is_no_rounding(stored: str) -> None:
+    """A static direction beside a mass of 2^-27, tied to a mass by 2^-20 N/m: what comes through."""
+    mixed = np.eye(4)
+    mixed[:3, :3] = [[1, 1, 2], [2, 3, 5], [1, 2, 4]]
+    M, K = np.diag([1.0, 2.0**-27, 0.0, 1.0]), np.diag([2.0, 3 * 2.0**-27, 1.0, 4.0])
+    K[0, 3] = K[3, 0] = 1.0
+    K[2, 3] = K[3, 2] = 2.0**-20
+    M, K = (mixed.T @ matrix @ mixed for matrix in (M, K))
+    model = mechss(M, None, K, mixed.T[:, [2]], mixed[[3]])
+    given = mechss(csc_array(M), None, csc_array(K), mixed.T[:, [2]], mixed[[3]]) if stored == "sparse" else model
+    points = np.array([0.5j, 3.0j])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", HalfdofWarning)  # the light mass costs digits
+        reduction = exact_reduction(given)
+    unit, X, D = np.eye(reduction.order), reduction.output.X, reduction.output.direct(1)
+    found = [(X @ np.linalg.solve(s * unit - reduction.A, reduction.B + 0j) + D)[0, 0] for s in points]
+    assert_allclose(found, exact.transfer(model, points)[0, 0], rtol=WEAK_TIE)
