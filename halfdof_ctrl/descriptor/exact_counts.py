@@ -19,6 +19,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import DenseMatrix
 from halfdof_ctrl.descriptor.residues import PRIMES, Residues, product, rank, reduced, residues
 
+NOT_ROUNDED_BITS = 51  #: of an entry that was not rounded, at most: one that was fills its double, but for one in four
 RANK_SEED = 20261129  #: of the points at which ranks are looked at
 
 
@@ -42,6 +43,18 @@ class ExactCounts:
     def blocks(self) -> tuple[int, ...]:
         """Sizes of the Jordan blocks at infinity of the pencil (8), the largest first."""
         return tuple([sum(step > block for step in self.steps) for block in range(max(self.steps, default=0))])
+
+
+def were_rounded(coefficients: Sequence[DenseMatrix]) -> bool:
+    """Return whether entries fill the digits of a double, as rounded ones do; others are what they say.
+
+    Examples
+    --------
+    >>> were_rounded([np.array([[3.0, 1.0 + 2.0**-45]])]), were_rounded([np.array([[0.1, 3.0]])])
+    (False, True)
+    """
+    parts = [part for matrix in coefficients for part in (matrix.real, matrix.imag)]
+    return any(bool((np.ldexp(np.frexp(part)[0], NOT_ROUNDED_BITS) % 1.0).any()) for part in parts)
 
 
 def exact_counts(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray
-from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts
+from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts, were_rounded
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
@@ -25,6 +25,9 @@ class FoundStructure:
     is_regular: bool
     doubts: tuple[str, ...]
     close: int = 0  #: how many of the largest values rest on parts that stand little above rounding
+    above: str = (
+        ""  #: what was taken as zero or not by a part that stands above rounding, the one doubt to be warned of
+    )
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
@@ -51,6 +54,10 @@ def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
         doubts.append(nearly_singular(share))
     blocks, most_index, doubt = _blocks(coefficients, counts, spectrum.values.size)
     doubts += doubt
+    above = next((doubt for doubt in doubts if "above rounding" in doubt), "")
+    if not above and counts.degree > spectrum.values.size and not were_rounded(coefficients):
+        above = not_rounded(counts.degree, spectrum.values.size)
+        doubts.append(above)
     return FoundStructure(
         values=spectrum.values,
         bounds=spectrum.bounds,
@@ -60,6 +67,7 @@ def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
         is_regular=True,
         doubts=tuple(doubts),
         close=spectrum.close,
+        above=above,
     )
 
 
@@ -68,6 +76,14 @@ def nearly_singular(share: float) -> str:
     return (
         f"the stored numbers are regular, but changes of {EPS / share:.1e} of each entry can make "
         f"det P(s) vanish identically, and rounding is {EPS:.1e}"
+    )
+
+
+def not_rounded(stored: int, found: int) -> str:
+    """Say that a part was taken as zero that rounding did not make."""
+    return (
+        f"the stored numbers have {stored} finite eigenvalues and not {found}: a part of M, C, K as small as rounding is "
+        "taken as zero, though their entries have so few digits that they were not rounded"
     )
 
 

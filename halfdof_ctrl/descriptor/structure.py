@@ -32,6 +32,7 @@ class PencilStructure:
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
     is_regular: bool  #: whether det P(s) is not identically zero, exactly
+    is_close: bool  #: whether the count rests on a part of M, C, K that stands above rounding, which was warned of
     uncertainty: tuple[str, ...]  #: what is uncertain, a sentence each
     model: SecondOrderModel = field(repr=False)  #: whose structure this is
 
@@ -88,7 +89,8 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     Warns
     -----
     CloseDecisionWarning
-        Eigenvalues far above all others rest on a part of M, C, K that stands little above rounding.
+        Eigenvalues far above all others rest on a part of M, C, K that stands little above rounding, or were left out
+        for a part of that size although the entries have too few digits to have been rounded.
 
     Notes
     -----
@@ -128,9 +130,8 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
     small = dense_copy(few, "pencil_structure", "The poles of mech2ss(model) are the finite eigenvalues.")
     found = found_structure(small.quadratics.P)
     order = order_by_size(found.values)
-    if found.close:
-        of_count = next(doubt for doubt in found.doubts if "above rounding" in doubt)
-        msg = f"The number of finite eigenvalues, {found.values.size}, is a close decision: {of_count}."
+    if found.above:
+        msg = f"The number of finite eigenvalues, {found.values.size}, is a close decision: {found.above}."
         give_warning(msg, CloseDecisionWarning)
     return PencilStructure(
         finite_eigenvalues=read_only(found.values[order]),
@@ -141,6 +142,7 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
         n_infinite=2 * n - found.values.size,
         infinite_blocks=(*found.blocks, *(1,) * (n - len(small.dofs))),  # of static DOFs that were condensed
         is_regular=found.is_regular,
+        is_close=bool(found.above),
         uncertainty=found.doubts,
         model=small if few is model else model,
     )

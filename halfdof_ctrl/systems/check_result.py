@@ -48,6 +48,7 @@ class CrossCheck:
     index: int  #: of the descriptor form, pencil (8); in a large sparse model not found, -1
     slycot: str  #: what slycot's ag08bd counts, where it is installed; it never decides
     limits: tuple[str, ...] = ()  #: what was not checked, and why
+    most_finite: int = -1  #: finite eigenvalues of the stored numbers, if these have more than are told from rounding
 
     @property
     def grade(self) -> Grade:
@@ -106,7 +107,8 @@ class CrossCheck:
     def _count(self) -> str:
         if self.n_finite < 0:
             return "not counted"
-        return f"{self.n_finite} finite, {self.n_infinite} infinite, index {self.index}"
+        finite = f"{self.n_finite} to {self.most_finite}" if self.most_finite > self.n_finite else f"{self.n_finite}"
+        return f"{finite} finite, {self.n_infinite} infinite, index {self.index}"
 
     def __repr__(self) -> str:
         """Print as a small table, as wide as a terminal."""
