@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix, FloatArray
+from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix, FloatArray
 from halfdof_ctrl.descriptor.exact_counts import ExactCounts, exact_counts, were_rounded
 from halfdof_ctrl.descriptor.finite_part import finite_part, infinite_part
 from halfdof_ctrl.descriptor.finite_spectrum import finite_spectrum
 from halfdof_ctrl.descriptor.first_order import first_order_pencil
-from halfdof_ctrl.descriptor.nearness import UNDECIDED, share_of_rounding
+from halfdof_ctrl.descriptor.nearness import UNDECIDED, nearly_singular, share_of_rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -71,19 +71,11 @@ def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
     )
 
 
-def nearly_singular(share: float) -> str:
-    """Say that a model is regular by no more than rounding."""
-    return (
-        f"the stored numbers are regular, but changes of {EPS / share:.1e} of each entry can make "
-        f"det P(s) vanish identically, and rounding is {EPS:.1e}"
-    )
-
-
 def not_rounded(stored: int, found: int) -> str:
     """Say that a part was taken as zero that rounding did not make."""
     return (
-        f"the stored numbers have {stored} finite eigenvalues and not {found}: a part of M, C, K as small as rounding is "
-        "taken as zero, though their entries have so few digits that they were not rounded"
+        f"the stored numbers have {stored} finite eigenvalues and not {found}: a part of M, C, K as small as rounding "
+        "is taken as zero, though their entries have so few digits that they were not rounded"
     )
 
 

@@ -48,6 +48,14 @@ def share_of_rounding(coefficients: Sequence[DenseMatrix]) -> float:
     return worst
 
 
+def nearly_singular(share: float, what: str = "P(s)") -> str:
+    """Say that a matrix polynomial is regular by no more than rounding."""
+    return (
+        f"the stored numbers are regular, but changes of {EPS / share:.1e} of each entry can make "
+        f"det {what} vanish identically, and rounding is {EPS:.1e}"
+    )
+
+
 def undecided_regularity(share: float, dofs: Sequence[str]) -> UncertainRankError:
     """Refuse to tell whether a model is singular whose stored numbers are regular by no more than rounding."""
     msg = (

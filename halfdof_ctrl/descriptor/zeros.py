@@ -7,13 +7,15 @@
 import numpy as np
 import scipy.linalg
 
-from halfdof_ctrl.base.arrays import ComplexArray, DenseMatrix
-from halfdof_ctrl.base.errors import CloseDecisionWarning, HalfdofError, MatrixError, give_warning
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, DenseMatrix
+from halfdof_ctrl.base.errors import CloseDecisionWarning, DataLimitWarning, HalfdofError, MatrixError, give_warning
 from halfdof_ctrl.base.progress import shows_activity
 from halfdof_ctrl.base.spectrum import sorted_eigenvalues
+from halfdof_ctrl.base.words import complex_in_words
 from halfdof_ctrl.descriptor.balancing import scaling_powers
+from halfdof_ctrl.descriptor.data_limit import AMPLIFIED, WARNED_DATA
 from halfdof_ctrl.descriptor.growth import system_pencil
-from halfdof_ctrl.descriptor.minors import invariant_zeros
+from halfdof_ctrl.descriptor.minors import Zeros, invariant_zeros
 from halfdof_ctrl.descriptor.regularity import require_regular
 from halfdof_ctrl.descriptor.staircase import ZERO_PIVOT
 from halfdof_ctrl.model.dense_copy import dense_copy
@@ -44,7 +46,10 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
     Warns
     -----
     CloseDecisionWarning
-        Inputs or outputs are so nearly dependent that the number of zeros may be wrong.
+        Inputs or outputs are so nearly dependent, or so nearly blind to a motion, that the number of zeros may be
+        wrong; those that are zeros but for rounding are among them.
+    DataLimitWarning
+        Rounding of the entries moves some of them by more than 1e-6 of their size.
 
     Raises
     ------
@@ -92,7 +97,26 @@ def zeros(model: SecondOrderModel) -> ComplexArray:
             "depend on each other but for rounding, or the model is rounded; leave one out by select() and compare."
         )
         give_warning(msg, CloseDecisionWarning)
+    _warn_of_bounds(model, found)
     return sorted_eigenvalues(found.values)
+
+
+def _warn_of_bounds(model: SecondOrderModel, found: Zeros) -> None:
+    """Warn of zeros that the entries of the model do not determine."""
+    away = found.values != 0.0
+    size, known = np.abs(found.values[away]), model.known_to
+    share = found.bounds[away] * max(known / EPS, 1.0) / size
+    vague = share > max(WARNED_DATA, AMPLIFIED * known)
+    if vague.any():
+        worst = int(share.argmax())
+        to = f"to {share[worst]:.1e} of its size" if share[worst] < 1.0 else "not at all"
+        msg = (
+            f"Entries of the model known to {known:.1e} determine {int(vague.sum())} of {found.values.size} zeros to "
+            f"less than {max(WARNED_DATA, AMPLIFIED * known):.0e} of their size, the one at "
+            f"{complex_in_words(complex(found.values[away][worst]))} rad/s {to}: terms far larger than what they leave "
+            "make it. Other programs that see these numbers err alike."
+        )
+        give_warning(msg, DataLimitWarning)
 
 
 def _independent(model: SecondOrderModel) -> tuple[list[int], list[int]]:
