@@ -4,21 +4,27 @@ The zeros of ``[P(s), -B(s); F(s), D(s)]`` of normal rank r are the roots of the
 of order r, its determinantal divisor (F. R. Gantmacher, The theory of matrices, 1959, chapter VI).
 """
 
+from fractions import Fraction
 from itertools import combinations
 from typing import Any
 
 import flint
 import numpy as np
 import numpy.typing as npt
+import pytest
 from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
 
-from halfdof_ctrl import SecondOrderModel, zeros
+from halfdof_ctrl import SecondOrderModel, mechss, zeros
+from halfdof_ctrl.base.errors import CloseDecisionWarning, DataLimitWarning, recording_warnings
 from support import exact
 from support.anykinds import drawn_models
 from support.structures import Structure
 
 SMALL = 4  # DOFs: the number of minors grows fast
 SCATTER = 1e-6  # of simple zeros, relative to the largest or one
+SHARP = 1e-12  # of a zero whose bound is a few roundings
 MOST = settings(max_examples=max(15, settings().max_examples // 4))
 
 
@@ -63,3 +69,29 @@ def test_zeros_are_those_of_the_determinantal_divisor(case: tuple[Structure, Sec
     roots: Any = numerator.complex_roots() if divisor.degree() > 0 else []
     for root in [complex(root) for root, times in roots if times == 1]:
         assert np.abs(found - root).min() <= SCATTER * max(1.0, float(np.abs(found).max()))
+
+
+@given(angle=st.floats(0.1, 1.4), stiffness=st.floats(2.0, 90.0))
+def test_zeros_that_only_rounding_parted_are_given_and_told(angle: float, stiffness: float) -> None:
+    """An oscillator that two outputs are blind to, in rotated coordinates: its eigenvalues are zeros of both."""
+    across, along = float(np.sin(angle)), float(np.cos(angle))
+    first, last = along**2 + stiffness * across**2, across**2 + stiffness * along**2
+    between = along * across * (1.0 - stiffness)
+    K = [[first, 0.0, between], [0.0, 3.0, 0.0], [between, 0.0, last]]
+    with recording_warnings() as caught:
+        found = zeros(mechss(np.eye(3), None, K, [1.0, 1.0, 0.0], [[along, 0.0, across], [0.0, 1.0, 0.0]]))
+    assert_allclose(np.sort_complex(found), np.sqrt(stiffness) * np.array([-1j, 1j]), rtol=SHARP, atol=SHARP)
+    x, y, a, b, c = (Fraction(number) for number in (across, along, first, between, last))
+    parted = (a * x - b * y) / x != (c * y - b * x) / y  # what the stored numbers make of the square of both
+    assert [warning.category for warning in caught] == [CloseDecisionWarning] * parted
+
+
+@pytest.mark.parametrize(("power", "told"), [(8, False), (36, True)])
+def test_a_zero_that_entries_do_not_determine_is_told(power: int, *, told: bool) -> None:
+    """Two masses on a spring of 1 N/m, tied by one of 2^36: a zero at 1 rad/s is known to 2^-16 of itself."""
+    stiff = 2.0**power
+    K = [[2.0, -1.0, 0.0], [-1.0, 2.0 + stiff, -stiff], [0.0, -stiff, stiff]]
+    with recording_warnings() as caught:
+        found = zeros(mechss(np.eye(3), None, K, [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]))
+    assert_allclose(np.abs(found[:2]), 1.0, rtol=1.0 / stiff)
+    assert [warning.category for warning in caught] == [DataLimitWarning] * told

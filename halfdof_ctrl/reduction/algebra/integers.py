@@ -17,6 +17,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
 PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
+ANY_POINT = 1_322_336_119  #: a remainder at which nothing happens but by chance
 UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
@@ -132,6 +133,24 @@ def independent_of(matrix: IntegerArray, order: Iterable[int], most: int | None 
             if len(found) in {most, work.shape[1]}:
                 break
     return found
+
+
+def is_regular(coefficients: FloatArray) -> bool:
+    """Return whether ``det(P_0 + P_1 s + P_2 s^2)`` of floating-point numbers does not vanish identically.
+
+    By remainders at one point: what is called regular is, for certain; one chance in 10^6 or so has it that another is.
+
+    Examples
+    --------
+    >>> small = np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-50]])
+    >>> is_regular(np.stack([small, 0 * small, 0 * small])), is_regular(np.ones((3, 2, 2)))
+    (True, False)
+    """
+    remainders = np.asarray(as_integers(coefficients)[0] % PRIME, dtype=np.int64)
+    value = np.zeros_like(remainders[0])
+    for part in remainders[::-1]:
+        value = (value * ANY_POINT + part) % PRIME
+    return len(independent_of(value.astype(object), range(len(value)))) == len(value)
 
 
 def degree_of_determinant(coefficients: FloatArray) -> int:

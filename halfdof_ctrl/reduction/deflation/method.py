@@ -32,6 +32,7 @@ from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_u
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
+from halfdof_ctrl.reduction.method.doubted_singular import not_singular_error
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
@@ -118,7 +119,13 @@ def by_deflation(model: SecondOrderModel, tol: float | None) -> Deflation:
     """
     if tol is not None:
         return replace(deflated(without_light_masses(model, tol), tol), model=model)
-    found = deflated(model)
+    try:
+        found = deflated(model)
+    except SingularPencilError as refusal:
+        uncertain = not_singular_error(model, refusal)
+        if uncertain is None:
+            raise
+        raise uncertain from refusal
     return replace(found, evidence=replace(found.evidence, loss=measured_loss(found)))
 
 
@@ -260,14 +267,26 @@ def _uncertain_error(
     closest = min((_decision(model, decision) for decision in decisions), key=lambda item: item.gap, default=None)
     dofs = model.dofs if closest is None else closest.dofs
     gap = float("inf") if closest is None else closest.gap
+    values = "" if closest is None else f" ({_values_in_words(closest)})"
     rest = f"with tol={tol:g} nothing is left of an equation" if tol is not None else "the order cannot be told"
     msg = (
         f"No decision about ranks gives state equations with the spectrum of P(s): to working precision {rest}. The "
-        f"closest decision is about DOFs {listed(dofs)} (singular values {gap:.1e} apart). Check their masses, "
+        f"closest decision is about DOFs {listed(dofs)}{values}. Check their masses, "
         "dampers, springs and constraints for entries that nearly cancel, or pass "
         f"{'tol' if tol is None else 'another tol'} to say which count as zero."
     )
     return UncertainRankError(msg, dofs=dofs, gap=gap)
+
+
+def _values_in_words(decision: RankDecision) -> str:
+    """Say how the values on both sides of a decision stand to each other and to rounding."""
+    values, rank = decision.singular_values, decision.rank
+    counts = f"{values[rank - 1]:.1e} counts" if rank else "none counts"
+    zero = f"{values[rank]:.1e} does not" if rank < values.size else "all do"
+    return (
+        f"of singular values up to {values.max(initial=0.0):.1e}, {counts} and {zero}; rounding of the entries "
+        f"explains {min(decision.noise, decision.bound):.1e}"
+    )
 
 
 def _probe(model: SecondOrderModel) -> SecondOrderModel:

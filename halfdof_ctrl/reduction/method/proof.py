@@ -53,7 +53,11 @@ class ScaledPencil:
 
     def is_singular(self) -> bool:
         """Whether P(s) is singular to working precision at all points."""
-        return all(self._smallest(s) <= SINGULAR_AT_POINTS * self.P.shape[1] for s in NEAR_POINTS)
+        return bool(self.regularity() <= SINGULAR_AT_POINTS * self.P.shape[1])
+
+    def regularity(self) -> float:
+        """Return the smallest singular value of P(s) over the largest, where it is best of a few points."""
+        return max(self._smallest(s) for s in NEAR_POINTS)
 
     def has_spectrum(self, A: FloatArray) -> bool:
         """Whether (19) holds for A in the same units."""
