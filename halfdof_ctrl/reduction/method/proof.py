@@ -4,7 +4,8 @@
 
 holds for every s if and only if A has the finite eigenvalues of the model, each as often. Three points near
 the typical frequency and two beyond the fastest pole tell a count that is wrong: each eigenvalue too many or too few
-changes the ratio between them by a power of the distance. Far out P(s) can be so ill conditioned that floating point
+changes the ratio between them by a power of the distance. Two more among the eigenvalues of A tell values that are
+wrong. Far out P(s) can be so ill conditioned that floating point
 does not know its determinant; that of small models is formed in integers then. What the state equations lose
 against a direct solve at such points is measured as well.
 """
@@ -24,6 +25,10 @@ from halfdof_ctrl.reduction.method.units import ScaledRows, Units, scaled_rows
 
 NEAR_POINTS = (0.55 + 0.83j, 1.9 + 0.7j, 0.21 + 3.1j)  #: points in units of the time scale
 RATIO_DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that rounding may make
+DRIFT_AMONG_POLES = 0.1  #: the same at points among the eigenvalues of A, which a loss that is told moves
+AMONG_EIGENVALUES = (0.25, 0.75)  #: quantiles of their sizes at which such points are
+NO_EIGENVALUE = 181  #: times a power of two: numbers of which no simple model has one as its eigenvalue
+STANDING = 1e-3  #: of the typical frequency and of the largest eigenvalue: smaller ones may stand for multiple zeros
 SINGULAR_AT_POINTS = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
 AXIS_POINTS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
 SOLVE_DOUBT = 4 * EPS  #: times n and the condition of P(s): differences that a direct solve may make
@@ -63,18 +68,39 @@ class ScaledPencil:
         """Whether (19) holds for A in the same units."""
         if not np.isfinite(A).all():
             return False
-        fastest = float(np.abs(np.linalg.eigvals(A)).max(initial=0.0))
-        beyond = 1 + math.frexp(max(fastest, 1.0))[1]  # powers of two, so that P(s) can be formed exactly
-        points = [*NEAR_POINTS, *(2.0**power for power in (beyond, beyond + 1))]
+        sizes = np.abs(np.linalg.eigvals(A))
+        beyond = 1 + math.frexp(max(float(sizes.max(initial=0.0)), 1.0))[1]
+        short = [(1, beyond), (1, beyond + 1), *self._among(sizes)]  # at which P(s) can be formed exactly
+        points = [*NEAR_POINTS, *(factor * 2.0**power for factor, power in short)]
         unit = np.eye(len(A))
         of_A = np.array([np.linalg.slogdet(s * unit - A)[1] for s in points])
         of_P = np.array([self._log_determinant(s) for s in points])
-        if np.ptp(of_P - of_A) > RATIO_DRIFT and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
-            integers, scale = as_integers(self.P)
-            for place, power in ((-2, beyond), (-1, beyond + 1)):
-                exact = integers[0] + (integers[1] << power) + (integers[2] << 2 * power)
-                of_P[place] = log_determinant(exact) - self.P.shape[1] * scale * math.log(2.0)
-        return bool(np.ptp(of_P - of_A) <= RATIO_DRIFT)
+        if not _is_constant(of_P - of_A) and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
+            of_P[len(NEAR_POINTS) :] = self._exact_log_determinants(short)
+        return _is_constant(of_P - of_A)
+
+    def _among(self, sizes: FloatArray) -> list[tuple[int, int]]:
+        """Return points among the eigenvalues of A, a factor and a power of two, of models that integers can judge.
+
+        The typical frequency of a stiff model may lie far above all of them, where any slow ones look the same.
+        """
+        moving = sizes[sizes > STANDING * sizes.max(initial=1.0)]
+        if not moving.size or self.P.shape[1] > LARGEST_EXACT:
+            return []
+        around = np.log2(np.quantile(moving, AMONG_EIGENVALUES) / NO_EIGENVALUE)
+        return [(NO_EIGENVALUE, power) for power in sorted({round(float(power)) for power in around})]
+
+    def _exact_log_determinants(self, points: list[tuple[int, int]]) -> FloatArray:
+        """Return logarithms of the size of det P at whole numbers times powers of two."""
+        integers, scale = as_integers(self.P)
+        found = []
+        for factor, power in points:
+            down, up = max(-power, 0), max(power, 0)
+            value = (
+                (integers[0] << 2 * down) + (integers[1] * factor << up + down) + (integers[2] * factor**2 << 2 * up)
+            )
+            found.append(log_determinant(value) - self.P.shape[1] * (scale + 2 * down) * math.log(2.0))
+        return np.array(found)
 
     def _log_determinant(self, s: complex) -> float:
         P, _ = self.at(s)
@@ -140,6 +166,16 @@ class ScaledPencil:
     def _smallest(self, s: complex) -> float:
         values = np.linalg.svd(self._scaled(s), compute_uv=False)
         return float(values[-1] / values[0]) if values[0] > 0.0 else 0.0
+
+
+def _is_constant(ratios: FloatArray) -> bool:
+    """Return whether logarithms of the ratio in (19) are the same at all points; the last ones are among the poles."""
+    first = len(NEAR_POINTS) + 2
+    with np.errstate(invalid="ignore"):
+        return bool(
+            np.ptp(ratios[:first]) <= RATIO_DRIFT
+            and not (np.abs(ratios[first:] - ratios[first - 2]) > DRIFT_AMONG_POLES).any()
+        )
 
 
 def _at(coefficients: FloatArray, s: complex) -> ComplexArray:

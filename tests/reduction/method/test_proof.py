@@ -170,3 +170,13 @@ def test_determinant_far_out_is_exact_where_floating_point_does_not_know_it() ->
     A = exact_reduction(model, method="orthogonal").A
     assert has_spectrum(model, A)
     assert not has_spectrum(model, np.block([[A, np.zeros((len(A), 1))], [np.zeros((1, len(A))), -np.ones((1, 1))]]))
+
+
+@pytest.mark.parametrize(("stiffness", "passes"), [(1.0, True), (9.0, False), (0.2, False)])
+def test_a_slow_spectrum_below_stiff_constraints_is_looked_at(stiffness: float, *, passes: bool) -> None:
+    """An oscillator of 1 rad/s beside four held masses on springs of 65536 N/m, whose units are not its own."""
+    M, K = np.diag([1.0] * 5 + [0.0] * 4), np.diag([1.0] + [2.0**16] * 4 + [0.0] * 4)
+    K[1:5, 5:] = K[5:, 1:5] = np.eye(4)
+    C = np.zeros_like(M)
+    C[0, 0] = 0.25
+    assert has_spectrum(mechss(M, C, K), np.array([[0.0, 1.0], [-stiffness, -0.25]])) is passes
