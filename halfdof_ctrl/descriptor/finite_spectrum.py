@@ -51,6 +51,8 @@ class FiniteSpectrum:
     most: int  #: what the stored numbers say exactly; k where nothing is in doubt
     doubts: tuple[str, ...]  #: what is uncertain, in words
     close: int = 0  #: how many of the largest rest on parts that stand little above rounding
+    unsure: int = 0  #: how many may be none where no circle counts as many as the list, or the list is not proved
+    is_open: bool = False  #: whether that is so
 
 
 @dataclass(slots=True)
@@ -62,6 +64,7 @@ class _Findings:
     radius: float = 0.0  #: zeros are known to this
     doubts: list[str] = field(default_factory=list)
     close: int = 0
+    is_open: bool = False
 
 
 def finite_spectrum(
@@ -80,7 +83,8 @@ def finite_spectrum(
     """
     blocks = diagonal_blocks(np.any([part != 0.0 for part in coefficients], axis=0))
     values, bounds, doubts = [np.zeros(0, dtype=np.complex128)], [np.zeros(0)], []
-    most = close = 0
+    most = close = unsure = 0
+    is_open = False
     for rows, columns in blocks:
         parts = [part[np.ix_(rows, columns)] for part in coefficients]
         if counts is not None and len(blocks) == 1:
@@ -95,9 +99,23 @@ def finite_spectrum(
         doubts += found.doubts
         most += of_block.degree
         close += found.close
+        unsure += _unsure(found, of_block.at_origin) if found.is_open else 0
+        is_open |= found.is_open
     return FiniteSpectrum(
-        values=np.concatenate(values), bounds=np.concatenate(bounds), most=most, doubts=tuple(doubts), close=close
+        values=np.concatenate(values),
+        bounds=np.concatenate(bounds),
+        most=most,
+        doubts=tuple(doubts),
+        close=close,
+        unsure=unsure,
+        is_open=is_open,
     )
+
+
+def _unsure(found: _Findings, exact_zeros: int) -> int:
+    """Count those of a list that is not proved which rounding moves by more than a little."""
+    clear = found.listed.bounds <= FAINT * np.abs(found.listed.values)
+    return int(np.count_nonzero(~clear)) + max(found.zeros - exact_zeros, 0)
 
 
 def _zero_bounds(found: _Findings, exact: int) -> FloatArray:
@@ -300,10 +318,12 @@ def _judge(polynomial: ScaledPolynomial, found: _Findings, counts: ExactCounts) 
                 f"{'it' if more == 1 else 'them'}, which an exact model would have at infinity"
             )
         else:
+            found.is_open = True
             around = "no whole number" if within is None else f"{within}"
             found.doubts.append(f"{told}; a circle around them holds {around}, the stored numbers have {counts.degree}")
     found.doubts += found.listed.doubts
     if total and not _is_proved(polynomial, found, largest):
+        found.is_open = True
         found.doubts.append(
             f"the list of {total} eigenvalues does not reproduce the logarithmic derivative of det P(s): some are "
             "missing, doubled or invented"

@@ -25,9 +25,9 @@ class FoundStructure:
     is_regular: bool
     doubts: tuple[str, ...]
     close: int = 0  #: how many of the largest values rest on parts that stand little above rounding
-    above: str = (
-        ""  #: what was taken as zero or not by a part that stands above rounding, the one doubt to be warned of
-    )
+    unsure: int = 0  #: how many may be none where `is_open`
+    is_open: bool = False  #: whether no circle counts as many as there are values, or these are not proved
+    above: str = ""  #: the doubt to be warned of: a part was taken as zero, or not, that stands above rounding
 
 
 @np.errstate(all="ignore")  # numbers near the largest and the smallest doubles; what comes of them is proved or doubted
@@ -67,6 +67,8 @@ def found_structure(coefficients: Sequence[DenseMatrix]) -> FoundStructure:
         is_regular=True,
         doubts=tuple(doubts),
         close=spectrum.close,
+        unsure=spectrum.unsure,
+        is_open=spectrum.is_open,
         above=above,
     )
 
@@ -106,9 +108,15 @@ def _blocks(
     """
     pencil = first_order_pencil(coefficients)
     rounded = infinite_part(pencil.A, pencil.E).blocks
-    if rounded == counts.blocks:
+    if rounded == counts.blocks and finite == counts.degree:
         return rounded, max(rounded, default=0), []
     index, exact = max(rounded, default=0), max(counts.blocks, default=0)
     doubt = f"the index is {exact} of the stored numbers and {index} by ranks up to rounding"
     is_meant = finite != counts.degree and sum(rounded) + finite == len(pencil.E)
+    if finite != counts.degree and not is_meant:
+        doubt = (
+            f"the index: it is {exact} of the stored numbers, with {counts.degree} finite eigenvalues, and {index} by "
+            f"ranks up to rounding, with {len(pencil.E) - sum(rounded)}, and neither goes with {finite} of them"
+        )
+        return counts.blocks, max(index, exact, len(pencil.E) - finite), [doubt]
     return (rounded if is_meant else counts.blocks), max(index, exact), [doubt] if exact != index else []

@@ -30,7 +30,7 @@ CLEAR = 4096.0  #: coefficients above so many are not
 
 
 def improper_pairs(
-    model: SecondOrderModel, eigenvalues: ComplexArray, index: int, degree: int | None = None
+    model: SecondOrderModel, eigenvalues: ComplexArray | None, index: int, degree: int | None = None
 ) -> tuple[tuple[str, str, int], ...]:
     """List the (input, output, order of growth) of all transfer functions that grow with frequency.
 
@@ -38,8 +38,8 @@ def improper_pairs(
     ----------
     model : SecondOrderModel
         With a regular pencil.
-    eigenvalues : (k,) complex ndarray
-        Its finite eigenvalues.
+    eigenvalues : (k,) complex ndarray, optional
+        Its finite eigenvalues; None where rounding left no way to tell them from infinite ones.
     index : int
         Index of the pencil (8).
     degree : int, optional
@@ -55,6 +55,8 @@ def improper_pairs(
     UncertainRankError
         A part that grows is of the size of rounding, and the stored numbers were rounded.
     """
+    if eigenvalues is None:
+        return _none_or_undecided(model, _bounds(model, index))
     order = growth_orders(model, eigenvalues, index, degree)
     return tuple([(model.inputs[j], model.outputs[i], int(order[i, j])) for i, j in np.argwhere(order > 0).tolist()])
 
@@ -72,6 +74,21 @@ def growth_orders(
     for i, j in np.argwhere(unclear).tolist():
         order[i, j] = max(0, _degree_of_pair(model, i, j) - eigenvalues.size)
     return order
+
+
+def _none_or_undecided(model: SecondOrderModel, bound: IntArray) -> tuple[tuple[str, str, int], ...]:
+    """Return no pair where none can grow, and refuse to tell otherwise."""
+    growing = np.argwhere(bound > 0)
+    if not growing.size:
+        return ()
+    i, j = growing[0].tolist()
+    msg = (
+        f"Whether the transfer function from {model.inputs[j]} to {model.outputs[i]} grows with frequency cannot be "
+        "told: parts of the size of rounding hide which eigenvalues of the pencil are finite, so that no circle is "
+        "around them. Give the model in the coordinates in which its constraints are plain numbers, or in units in "
+        "which its entries are of one size."
+    )
+    raise UncertainRankError(msg, dofs=(model.inputs[j], model.outputs[i]), gap=1.0)
 
 
 def _undecided(model: SecondOrderModel, unclear: npt.NDArray[np.bool_], size: FloatArray) -> UncertainRankError:

@@ -28,11 +28,12 @@ class PencilStructure:
     bounds: FloatArray  #: (k,) how far rounding of M, C, K may have moved each of them [rad/s]
     most_index: int  #: the index, or a larger one that the ranks up to rounding have
     most_finite: int  #: finite eigenvalues of the stored numbers, exactly: k, or more where rounding makes some
-    fewest_finite: int  #: k, without those that rest on parts which stand little above rounding
+    fewest_finite: int  #: k, without those that rest on parts of M, C, K which stand little above rounding
     n_infinite: int  #: infinite eigenvalues of the companion form of dimension 2n
     infinite_blocks: tuple[int, ...]  #: sizes of the Jordan blocks at infinity of the pencil (8), the largest first
     is_regular: bool  #: whether det P(s) is not identically zero, exactly
     is_close: bool  #: whether the count rests on a part of M, C, K that stands above rounding, which was warned of
+    is_open: bool  #: whether rounding left no way to tell finite eigenvalues from infinite ones
     uncertainty: tuple[str, ...]  #: what is uncertain, a sentence each
     model: SecondOrderModel = field(repr=False)  #: whose structure this is
 
@@ -68,7 +69,8 @@ class PencilStructure:
         """
         if not self.is_regular:
             return ()
-        return improper_pairs(self.model, self.finite_eigenvalues, self.most_index, self.most_finite)
+        known = None if self.is_open else self.finite_eigenvalues
+        return improper_pairs(self.model, known, self.most_index, self.most_finite)
 
 
 @shows_activity("eigenvalues of the pencil")
@@ -138,11 +140,12 @@ def pencil_structure(model: SecondOrderModel) -> PencilStructure:
         bounds=read_only(found.bounds[order]),
         most_index=found.most_index,
         most_finite=found.most,
-        fewest_finite=found.values.size - found.close,
+        fewest_finite=found.values.size - max(found.close, found.unsure),
         n_infinite=2 * n - found.values.size,
         infinite_blocks=(*found.blocks, *(1,) * (n - len(small.dofs))),  # of static DOFs that were condensed
         is_regular=found.is_regular,
         is_close=bool(found.above),
+        is_open=found.is_open,
         uncertainty=found.doubts,
         model=small if few is model else model,
     )

@@ -20,6 +20,7 @@ from halfdof_ctrl import (
     mechss,
     pencil_structure,
 )
+from halfdof_ctrl.base.arrays import EPS, FloatArray
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ComplexModelError,
@@ -29,7 +30,8 @@ from halfdof_ctrl.base.errors import (
     SingularPencilError,
     recording_warnings,
 )
-from halfdof_ctrl.systems import transfer_check
+from halfdof_ctrl.descriptor import radau
+from halfdof_ctrl.systems import step_check, transfer_check
 from halfdof_ctrl.systems.judged import Grade
 from halfdof_ctrl.systems.pole_check import compare_poles
 from halfdof_ctrl.systems.refined_poles import refined_poles
@@ -488,3 +490,26 @@ def test_refining_where_the_sides_differ_lets_no_wrong_system_off(structure: Str
     assert some.transfer_grade == every.transfer_grade
     assert some.max_transfer_error == pytest.approx(every.max_transfer_error, rel=CHANGE)
     assert some.transfer_worst == every.transfer_worst
+
+
+@pytest.mark.parametrize("grown", [np.inf, 1e30])
+def test_an_integration_that_rounding_runs_away_with_is_not_followed(
+    monkeypatch: pytest.MonkeyPatch, grown: float
+) -> None:
+    """Steps that one more rounding of M, C, K changes by more than the response say nothing, and it is said."""
+    model = hydromount()
+    stiffness = float(model.K.sum())
+
+    def run_away(model: SecondOrderModel, plan: tuple[radau.Segment, ...]) -> FloatArray:
+        exact = radau.descriptor_step_response(model, plan)
+        exact[:, :, -1] += grown * (float(model.K.sum()) / stiffness - 1.0 + EPS)
+        return exact
+
+    sys = system_of_model(model)
+    monkeypatch.setattr(step_check, "descriptor_step_response", run_away)
+    check = crosscheck(model, sys)
+    assert check.verdict == "ok"
+    assert check.step_worst == "not followed: rounding of M, C, K grows in its steps"
+    assert "not followed" in repr(check)
+    wrong = control.StateSpace(sys.A * (1 + 1e-6), sys.B, sys.C, sys.D)
+    assert crosscheck(model, wrong).verdict == "failed"
