@@ -16,12 +16,16 @@ from halfdof_ctrl.base.doors import is_choice, shown
 from halfdof_ctrl.base.errors import (
     CloseDecisionWarning,
     ImproperError,
+    NoStateSpaceError,
     ParameterError,
     SignalNameError,
+    UncertainRankError,
     give_warning,
+    recording_warnings,
 )
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
+from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.doors import require_matrix
 from halfdof_ctrl.model.mechss import mechss
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -36,6 +40,7 @@ from halfdof_ctrl.systems.state_map import StateMap, States, require_kind, requi
 
 REDUCIBLE = (SecondOrderModel, ExactReduction)  #: what brings its matrices and names with it
 DOF_STATES = ("dofs", "scaled")  #: kinds of states that are displacements and velocities, but for powers of two
+MOST_CONFIRMED = 60  #: DOFs of a model up to which the oracle is asked to confirm a refusal
 NOT_GIVEN = frozenset({type(None)})  #: the type of what is not given
 
 Improper: TypeAlias = Literal["refuse", "drop"]
@@ -150,7 +155,7 @@ def system_of_model(
     reduction = model if isinstance(model, ExactReduction) else reduced(model)
     output = reduction.output
     if len(output.U) > 1 and improper == "refuse":
-        raise _improper_error(reduction.model, output)
+        raise _refusal(reduction.model, output)
     model = reduction.model
     if states not in DOF_STATES:
         return _in_energy_states(reduction, states)
@@ -234,6 +239,30 @@ def labelled_system(
         outputs=list(control_labels(outputs)),
         **labels,
     )
+
+
+def _refusal(model: SecondOrderModel, output: Signal) -> NoStateSpaceError:
+    """Make the refusal of improper pairs, or of telling which ones are, where the oracle cannot confirm them."""
+    improper = _improper_error(model, output)
+    if model.is_sparse or len(model.dofs) > MOST_CONFIRMED:
+        return improper
+    with recording_warnings():
+        structure = pencil_structure(model)
+    if structure.is_certain:
+        return improper
+    try:
+        pairs = structure.improper_pairs
+    except UncertainRankError as doubt:
+        return doubt
+    if set(pairs) == set(improper.pairs):
+        return improper
+    shown = listed([f"{result} from {cause}" for cause, result, _ in improper.pairs], most=4)
+    msg = (
+        f"Whether the transfer functions {shown} grow with frequency cannot be told: by the state equations they do, "
+        f"by the pencil {'others' if pairs else 'none'} do, and {structure.uncertainty[0]}. Give the model in the "
+        "coordinates in which its constraints are plain numbers, or in units in which its entries are of one size."
+    )
+    return UncertainRankError(msg, dofs=improper.pairs[0][:2], gap=1.0)
 
 
 def _improper_error(model: SecondOrderModel, output: Signal) -> ImproperError:

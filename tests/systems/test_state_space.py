@@ -16,7 +16,9 @@ from halfdof_ctrl.base.errors import (
     MatrixError,
     SignalNameError,
     SingularPencilError,
+    UncertainRankError,
 )
+from halfdof_ctrl.systems import state_space
 from support import exact
 from support.comparison import POINTS, assert_same_transfer, response
 from support.structures import Structure, assembly, damped_structures, null_columns, passive, structures
@@ -179,3 +181,24 @@ def test_extreme_units_of_force_keep_the_poles(power: int) -> None:
     assert_allclose(sys.A, mech2ss(mount).A, rtol=ROUNDOFF, atol=1e-13)
     assert_allclose(sys.D * factor, np.zeros((3, 3)), rtol=0.0, atol=ROUNDOFF)
     assert_allclose(sys.B * factor, mech2ss(mount).B, rtol=ROUNDOFF)
+
+
+class Unsure:
+    """A structure that rounding left in doubt, with the pairs that the oracle finds."""
+
+    is_certain = False
+    uncertainty = ("2 of 4 eigenvalues are in doubt",)
+
+    def __init__(self, *pairs: tuple[str, str, int]) -> None:
+        self.improper_pairs = pairs
+
+
+def test_improper_pairs_that_the_oracle_does_not_find_are_uncertain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A velocity of a static DOF grows; where the pencil of rounded numbers does not say so, that cannot be told."""
+    model = mechss(np.diag([1, 0]), None, [[3, -1], [-1, 1]], dofs=["y", "tip"]).select("F_tip", "tip_dot")
+    monkeypatch.setattr(state_space, "pencil_structure", lambda _: Unsure(("F_tip", "tip_dot", 1)))
+    with pytest.raises(ImproperError, match="grows as s"):
+        mech2ss(model)
+    monkeypatch.setattr(state_space, "pencil_structure", lambda _: Unsure())
+    with pytest.raises(UncertainRankError, match=r"tip_dot from F_tip grow with frequency cannot be told.*none do"):
+        mech2ss(model)

@@ -2,8 +2,8 @@
 
 In rotated coordinates and beside stiff parts a soft one is lost to working precision: P(s) then seems singular at every
 s, though no rounding of the entries makes it so. A model that was singular before its entries were rounded, in decimals
-or by a change of coordinates, is within half a rounding of that. So the two are told apart by the smallest change of the
-entries that makes P(s) singular.
+or by a change of coordinates, is within half a rounding of that. So the smallest change of the entries that makes P(s)
+singular tells the two apart.
 """
 
 import numpy as np
