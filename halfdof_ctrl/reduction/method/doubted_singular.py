@@ -1,4 +1,4 @@
-"""Whether a pencil that seems singular is: what changes of the entries by rounding can make of it, and what they cannot.
+"""Whether a pencil that seems singular is: what rounding of the entries can make of it, and what it cannot.
 
 In rotated coordinates and beside stiff parts a soft one is lost to working precision: P(s) then seems singular at every
 s, though no rounding of the entries makes it so. A model that was singular before its entries were rounded, in decimals
