@@ -25,6 +25,7 @@ from halfdof_ctrl.base.errors import (
 )
 from halfdof_ctrl.base.names import Names, control_label, control_labels, listed
 from halfdof_ctrl.base.sparse_arrays import MatrixLike
+from halfdof_ctrl.descriptor.exact_counts import were_rounded
 from halfdof_ctrl.descriptor.structure import pencil_structure
 from halfdof_ctrl.model.doors import require_matrix
 from halfdof_ctrl.model.mechss import mechss
@@ -242,9 +243,12 @@ def labelled_system(
 
 
 def _refusal(model: SecondOrderModel, output: Signal) -> NoStateSpaceError:
-    """Make the refusal of improper pairs, or of telling which ones are, where the oracle cannot confirm them."""
+    """Make the refusal of improper pairs, or of telling which ones are, where the oracle cannot confirm them.
+
+    Entries that were not rounded are what they say, and their ranks are found in exact arithmetic.
+    """
     improper = _improper_error(model, output)
-    if model.is_sparse or len(model.dofs) > MOST_CONFIRMED:
+    if model.is_sparse or len(model.dofs) > MOST_CONFIRMED or not were_rounded(model.quadratics.P):
         return improper
     with recording_warnings():
         structure = pencil_structure(model)
@@ -254,7 +258,7 @@ def _refusal(model: SecondOrderModel, output: Signal) -> NoStateSpaceError:
         pairs = structure.improper_pairs
     except UncertainRankError as doubt:
         return doubt
-    if set(pairs) == set(improper.pairs):
+    if {pair[:2] for pair in pairs} == {pair[:2] for pair in improper.pairs}:
         return improper
     shown = listed([f"{result} from {cause}" for cause, result, _ in improper.pairs], most=4)
     msg = (
