@@ -20,7 +20,7 @@ from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE, lo
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
-UNEVEN = 1e5  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
+UNEVEN = 1e4  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
 EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
 FASTER_POINTS = 6  #: frequencies besides the slowest ones, over all others: what is lost may show at any mode

@@ -224,3 +224,14 @@ def test_growth_within_a_block_does_not_overflow() -> None:
     b, c = np.eye(n)[:, :1], np.eye(n)[1:2]
     values = ShiftedSolver(A, b[:, 0])
     assert_allclose((c @ values.Q @ values.solve(np.array([1j])))[0, 0], 1e-40 / (1.0 + 1j) ** 2, rtol=1e-13)
+
+
+def test_what_d_cancels_is_no_part_of_a_bound() -> None:
+    """The acceleration of a mass towards rest is what C x leaves of D = 1: values are off by as much as is admitted."""
+    A, B = np.array([[0.0, 1.0], [-4.0, -0.5]]), np.array([[0.0], [1.0]])
+    C, D = A[1:], np.ones((1, 1))
+    for omega in (1e-3, 1e-5, 1e-6):
+        found = bounded_response(A, B, C, D, np.array([1j * omega]))
+        right = -(omega**2) / (4.0 - omega**2 + 0.5j * omega)
+        assert abs(found.values[0, 0, 0] - right) <= found.bound * abs(right)
+    assert bounded_response(A, B, C, D, np.array([1j])).bound < POINTWISE

@@ -70,3 +70,10 @@ def test_a_response_right_at_a_few_points_is_right_at_all_points() -> None:
     omega = np.geomspace(0.01, 1e4, 100)
     exact = transfer(model, 1j * omega)[0, 0]
     assert_allclose(frequency_response(model, omega).complex, exact, rtol=EVALUATED)
+
+
+def test_accelerations_keep_their_digits_towards_rest() -> None:
+    """Of a model they come from the descriptor form, where sums of the states cancel."""
+    model = hydromount().select("F_y", "y_ddot")
+    omega = np.geomspace(1e-5, 1e-1, 9)
+    assert_allclose(frequency_response(model, omega).complex, transfer(model, 1j * omega)[0, 0], rtol=EVALUATED)

@@ -11,7 +11,7 @@ import numpy as np
 from halfdof_ctrl.base.arrays import EPS, FloatArray, is_zero, read_only, unit_matrix
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.blocks import connected_columns
-from halfdof_ctrl.reduction.algebra.leading_matrix import LeadingMatrix
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.dense.partition import DofPartition
 from halfdof_ctrl.reduction.method.signals import Rounding, Signal, StateEquations, absorbed, trimmed
@@ -124,10 +124,10 @@ def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tu
     n, n_i, moving = solved.shape[0], partition.n_inertial, partition.n_inertial + partition.n_half
     N = moving + n_i
     X = np.zeros((n, N))
-    if partition.basis is None:
+    if partition.basis is None and n > FEW_DOFS:
         X[partition.order[:moving], np.arange(moving)] = 1.0
     else:
-        X[:, :moving] = partition.basis[:, :moving]
+        X[:, :moving] = partition.T[:, :moving]
     inputs: tuple[FloatArray, ...] = ()
     if moving < n:
         X += partition.from_static(solved[moving:, :N])

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from halfdof_ctrl import SecondOrderModel, exact_reduction, mechss
+from halfdof_ctrl.reduction.algebra import leading_matrix
 from halfdof_ctrl.reduction.algebra.leading_matrix import PLAINLY_REGULAR_IF_SMALL, LeadingMatrix
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
@@ -132,3 +133,20 @@ def test_condition_of_the_leading_matrix_is_the_same_in_any_units(
     if not plain.is_singular:
         ratio = min(plain.rcond, PLAINLY_REGULAR_IF_SMALL) / min(other.rcond, PLAINLY_REGULAR_IF_SMALL)
         assert 1.0 / FACTOR <= ratio <= FACTOR
+
+
+def test_a_large_matrix_that_is_surely_regular_is_factorized_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chain of static nodes, condition 1e5: no scaling changes it, and none is looked for."""
+    tried: list[int] = []
+    factorize = leading_matrix.lu_and_rcond
+
+    def counted(W: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        tried.append(len(W))
+        return factorize(W)
+
+    monkeypatch.setattr(leading_matrix, "lu_and_rcond", counted)
+    n = 600
+    leading = LeadingMatrix.factorized(2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    assert tried == [n]
+    assert not leading.is_plainly_regular
+    assert_allclose(leading.solve(np.ones((n, 1)))[n // 2 - 1, 0], n / 2 * (n / 2 + 1) / 2, rtol=ROUNDOFF)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.reduction.algebra import scaling
 from halfdof_ctrl.reduction.algebra.scaling import (
     EVEN,
     level_scaling,
@@ -110,3 +111,16 @@ def test_time_is_that_of_the_direct_solution(size: int, seed: int) -> None:
     coefficients = np.stack([badly_scaled(seed + k, (size, size), 1.0)[1] for k in range(3)])
     assert_allclose(time_log(list(coefficients)), log_scaling_with_time(coefficients)[2], atol=ITERATED)
     assert time_log([np.eye(size), np.zeros((size, size)), np.zeros((size, size))]) == 0.0
+
+
+def test_many_rows_are_scaled_as_few_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Time first and then rows and columns, by iteration: the same scaled coefficients as by all unknowns at once."""
+    generator = np.random.default_rng(0)
+    chain = 2.0 * np.eye(12) - np.eye(12, k=1) - np.eye(12, k=-1)
+    units = 10.0 ** generator.uniform(-3.0, 3.0, (2, 12))
+    P = np.stack([1e4 * chain, 0.1 * chain, np.diag(generator.uniform(1.0, 9.0, 12))]) * units[0][:, None] * units[1]
+    few = log_scaling_with_time(P)
+    monkeypatch.setattr(scaling, "FEW_UNKNOWNS", 1)
+    many = log_scaling_with_time(P)
+    assert_allclose(many[2], few[2], atol=ITERATED)
+    assert_allclose(many[0][:, None] + many[1], few[0][:, None] + few[1], atol=ITERATED)

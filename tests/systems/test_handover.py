@@ -1,0 +1,86 @@
+"""What is said of a state space that is handed over: of its own numbers, and of no others."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from halfdof_ctrl import exact_reduction, frequency_response, hydromount, lqr, mech2ss, mechss, state_map, step_response
+from halfdof_ctrl.errors import LostDigitsWarning
+from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.method.evidence import Evidence
+from halfdof_ctrl.systems.state_map import States
+from halfdof_ctrl.systems.working_states import model_poles
+from support.rational import rational_transfer
+from support.verdict import Improved
+
+SIZE = 30.0  # a measured loss is right to this factor
+TOLD = re.compile(r"lose (\S+) of (\S+) from (\S+) at (\S+) rad/s")
+
+
+def light_end() -> SecondOrderModel:
+    """Make a mass on a soft spring, and a light one on a stiff spring at it, whose acceleration is looked at."""
+    model = mechss(np.diag([1.0, 1e-8]), np.diag([0.1, 0.1]), [[1001.0, -1000.0], [-1000.0, 1000.0]], [[1.0], [0.0]])
+    return model.select(outputs=["q1_ddot", "q0"])
+
+
+def assert_right(message: str, model: SecondOrderModel, stored: Improved) -> None:
+    """Compare what is told of a loss with exact arithmetic."""
+    size, output, _, omega = TOLD.findall(message)[0]
+    right = rational_transfer(model).at(1j * float(omega))
+    lost = np.abs(stored.exactly_at(1j * float(omega)) - right)[model.outputs.index(output)].max()
+    value = np.abs(right[model.outputs.index(output)]).max()
+    assert float(size) / SIZE < lost / value < float(size) * SIZE
+
+
+@pytest.mark.parametrize("states", ["energy", "modal"])
+def test_energy_states_are_told_of_where_they_lose_as_exact_arithmetic_says(states: States) -> None:
+    """Accelerations are rows of A in DOF states; of strains and momenta they are sums that cancel towards rest."""
+    model = light_end()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LostDigitsWarning)
+        exact_reduction(model)
+    with pytest.warns(LostDigitsWarning, match="strains and momenta hold what cancels") as caught:
+        sys = mech2ss(model, states=states)
+    assert_right(str(caught[0].message), model, Improved(sys.A, sys.B, sys.C, sys.D))
+
+
+def test_digits_that_are_not_used_are_not_told_of(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Responses and poles are worked in energy states; who gets A and B in states of DOFs is told what they lose."""
+    told = []
+    monkeypatch.setattr(Evidence, "warn_of_loss", lambda *_: told.append(1))
+    model = hydromount().select(inputs="F_y", outputs="y")
+    step_response(model)
+    model_poles(model)
+    frequency_response(model, np.array([1.0, 10.0]))
+    mech2ss(model, states="energy")
+    mech2ss(model, states="modal")
+    state_map(model, "energy")
+    assert not told
+    mech2ss(model)
+    mech2ss(model, states="scaled")
+    state_map(model, "dofs")
+    lqr(model, displacement={"y": 1.0}, effort={"F_y": 1.0})
+    assert len(told) == 4
+
+
+def test_responses_worked_in_states_of_dofs_tell_what_these_lose(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A follower force leaves no energy states."""
+    told = []
+    monkeypatch.setattr(Evidence, "warn_of_loss", lambda *_: told.append(1))
+    model = mechss(np.eye(2), 0.1 * np.eye(2), [[2.0, 1.0], [-1.0, 2.0]])
+    step_response(model)
+    model_poles(model)
+    assert len(told) == 2
+
+
+def test_accelerations_in_other_units_are_measured_towards_rest() -> None:
+    """A factor rounds each entry of the row of A that an acceleration is: they no longer cancel towards rest."""
+    K = [[1001.0, -1000.0, 0.0], [-1000.0, 1700.0, -700.0], [0.0, -700.0, 703.0]]
+    model = mechss(np.diag([1.0, 1e-8, 1.0]), 0.1 * np.eye(3), K, [[1.0], [0.0], [0.0]], H=[[0.0, 1.0 / 3.0, 0.0]])
+    with pytest.warns(LostDigitsWarning, match="as double precision stores them lose") as caught:
+        reduction = exact_reduction(model)
+    output = reduction.output
+    stored = Improved(reduction.A, reduction.B, output.X, output.direct(1))
+    assert_right(str(caught[0].message), model, stored)
