@@ -10,9 +10,7 @@ import numpy as np
 
 from halfdof_ctrl.base.errors import CloseDecisionWarning, give_warning
 from halfdof_ctrl.model.second_order import SecondOrderModel
-from halfdof_ctrl.reduction.algebra.integers import degree_of_determinant, has_short_entries
-
-MOST_EXACT = 30  #: DOFs up to which the degree is found, in 30 ms
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, degree_of_determinant, has_short_entries
 
 
 def exact_order(model: SecondOrderModel) -> int | None:
@@ -24,7 +22,7 @@ def exact_order(model: SecondOrderModel) -> int | None:
     >>> exact_order(mechss([[1, 1], [1, 1 + 2.0**-48]], None, [[2, 0], [0, 3]]))
     4
     """
-    if len(model.dofs) > MOST_EXACT:
+    if len(model.dofs) > LARGEST_EXACT:
         return None
     P = np.stack(model.as_dense().quadratics.P if model.is_sparse else model.quadratics.P)
     return degree_of_determinant(P) if has_short_entries(P) else None

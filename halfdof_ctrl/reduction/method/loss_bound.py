@@ -3,10 +3,10 @@
 Rounding that moves A and B by dA and dB, and displacements q = X x + U u by dX and dU, moves outputs
 y = F q + G q' + D u, to first order, by
 
-    |C (s I - A)^-1| (dA |x| + dB) + |F + s G| (dX |x| + dU) + eps (|C| |x| + |D|),    x = (s I - A)^-1 B.      (29a)
+    |C (s I - A)^-1| (dA |x| + dB) + |F + s G| (dX |x| + dU) + eps (|C| |x| + |D|),    x = (s I - A)^-1 B.
 
 The bound takes a tenth of the time of a measurement, which ordinary models are spared; where it is no small part of
-the value, that says nothing.
+the value, that says nothing. Derivation: docs/explanation/evaluation.md.
 """
 
 import numpy as np

@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from halfdof_ctrl import exact_reduction, mechss
 from halfdof_ctrl.base.errors import CloseDecisionWarning, HalfdofWarning, LostDigitsWarning
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.loss_points import loss_points
 from halfdof_ctrl.reduction.method.refined_answers import StateSolver
 from support.anykinds import Kind, in_units, massless_nodes, mixed, nearly_singular, signals
@@ -117,3 +118,12 @@ def test_a_pencil_that_is_regular_by_a_last_digit_is_not_called_singular() -> No
         reduction = exact_reduction(model)
     assert reduction.order == 2
     assert_allclose(reduction.A, [[0.0, 1.0], [-1.0, 0.0]])
+
+
+def test_states_are_counted_in_models_of_fifty_dofs() -> None:
+    """A mass of 2^-44 beside a zero, among masses on springs of their own: two states for each DOF."""
+    M, K = np.diag(np.full(50, 2.0)), np.diag(np.full(50, 3.0))
+    M[:2, :2] = [[4.0 + 2.0**-44, 2.0], [2.0, 1.0]]
+    assert exact_order(mechss(M, None, K)) == 100
+    M[0, 0] = 4.0
+    assert exact_order(mechss(M, None, K)) == 98
