@@ -66,7 +66,7 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
         scale = factors[:, None]
         if not is_well_conditioned(A):
             return False
-    plain = not any(part.any() for part in (*model.quadratics.F[1:], *model.quadratics.D))
+    plain = is_zero(model.G, model.H) and is_zero(model.D, model.Dv, model.Da)
     if not q.U and plain:
         return True
     x = np.asarray(scale * np.linalg.solve(A, equations.B / scale))
