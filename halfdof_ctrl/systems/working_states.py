@@ -202,8 +202,9 @@ def _refined_where_wrong(
     with np.errstate(invalid="ignore"):
         worse = np.abs(values[:, :, tested] - exact) > np.abs(others[:, :, tested] - exact)
     values = np.where(doubt & worse[:, :, nearest], others, values)
-    if not _agree(values[:, :, tested], exact) and doubtful.size * len(model.dofs) ** 3 <= SOLVING_EFFORT:
-        tested, exact = doubtful, refined_response(model, points[doubtful])
+    every = np.union1d(doubtful, np.flatnonzero(points))  # where both agree they may have rounded the same terms
+    if not _agree(values[:, :, tested], exact) and every.size * len(model.dofs) ** 3 <= SOLVING_EFFORT:
+        tested, exact = every, refined_response(model, points[every])
     with np.errstate(invalid="ignore"):
         wrong = doubt[:, :, tested] | ~(np.abs(values[:, :, tested] - exact) <= SOUND_RESPONSE * np.abs(exact))
     values[:, :, tested] = np.where(wrong & np.isfinite(exact), exact, values[:, :, tested])
