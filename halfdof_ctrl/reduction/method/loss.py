@@ -200,17 +200,19 @@ def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
 
 
 def _stays(omega: FloatArray, value: FloatArray, slow: Slow) -> npt.NDArray[np.bool_]:
-    """Return which channels change no faster, to the next point, than one that is looked at: below all that moves.
+    """Return which channels change no faster, to a point beside, than one that is looked at: below all that moves.
 
     Towards rest others fall or rise without end.
     """
-    stays = np.ones(value.shape, dtype=np.bool_)
-    below = min(int(np.count_nonzero(omega < slow.typical)), len(omega) - 1)
-    lower, higher = value[:below], value[1 : below + 1]
+    lower, higher = value[:-1], value[1:]
     ratio = np.divide(lower, higher, out=np.zeros_like(lower), where=higher > 0.0)
-    steepest = np.where(omega[:below] < slow.least, 0.0, AT_CORNER)
-    most = STAYS * (omega[1 : below + 1] / omega[:below]) ** steepest
-    stays[:below] = np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min)) < most[:, None, None]
+    change = np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min))
+    at_rest = change < STAYS
+    gently = change < STAYS * ((omega[1:] / omega[:-1]) ** AT_CORNER)[:, None, None]
+    stays = np.ones(value.shape, dtype=np.bool_)
+    stays[:-1] = np.where((omega[:-1] < slow.least)[:, None, None], at_rest, gently)
+    stays[1:] |= np.where((omega[1:] < slow.least)[:, None, None], False, gently)  # noqa: FBT003
+    stays[omega >= slow.typical] = True
     return stays
 
 

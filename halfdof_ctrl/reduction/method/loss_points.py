@@ -16,10 +16,11 @@ import scipy.linalg
 from scipy.linalg.lapack import dgetrf
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, as_dense
 from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.model.free_motions import free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.integers import degree_of_determinant, has_short_entries
 from halfdof_ctrl.reduction.algebra.scaling import log_scaling_with_time
 from halfdof_ctrl.reduction.method.masses import slowest_speed
 
@@ -34,6 +35,7 @@ TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as w
 ANOTHER_SCALE = 3.0  #: binary logarithm of the ratio of two typical frequencies, from which on both are looked at
 SLOWEST_SPEED = 1e-6  #: slower modes of such a model, in these units, are free motions that rounding has moved
 TOWARDS_REST = (1e-12, 1e-8, 1e-4, 0.1)  #: of the slowest frequency of a model of few DOFs without free motions
+EXACTLY_COUNTED = 20  #: DOFs up to which poles at the origin are counted exactly, in a few milliseconds
 TOWARDS_FREE = 0.2  #: of the slowest other frequency of one with free motions, or, if the next is less, ...
 DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
 NEAR_ORIGIN = 1e-3  #: of the slowest frequency: a slower pole may be one at the origin that rounding has moved
@@ -105,12 +107,15 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     signals : sequence of float
         `signal_speeds`.
     """
-    speeds, slow = typical_speeds(model), np.abs(loss_points(A)) if len(A) else np.zeros(0)
-    own = np.concatenate([slow[slow > SLOWEST_SPEED * min(speeds)], np.outer(speeds, TYPICAL_SPEEDS).ravel()])
+    speeds, sizes = typical_speeds(model), np.sort(np.abs(np.linalg.eigvals(A)))
+    at_origin, exactly = _poles_at_origin(model, sizes, SLOWEST_SPEED * min(speeds))
+    slowest = sizes[at_origin] / 2.0 if exactly and at_origin < sizes.size else SLOWEST_SPEED * min(speeds)
+    slow = np.abs(loss_points(A)) if len(A) else np.zeros(0)
+    if exactly:
+        slow = np.append(slow, BESIDE_MODE * sizes[at_origin : at_origin + 1])
+    own = np.concatenate([slow[slow > slowest], np.outer(speeds, TYPICAL_SPEEDS).ravel()])
     corners = _apart(np.asarray(signals))
     chosen = np.unique(np.concatenate([own, [slowest_speed(model) * BESIDE_MODE], corners]))
-    sizes, free = np.sort(np.abs(np.linalg.eigvals(A))), free_motion_count(model.M, model.C, model.K)
-    at_origin = int(np.count_nonzero(sizes < SLOWEST_SPEED * min(speeds))) if free is None else free.poles
     if at_origin:
         others = next(part for part in (sizes[at_origin:], corners, own) if part.size)
         least = min(_end_of_drift(sizes[:at_origin]), TOWARDS_FREE * float(others.min()))
@@ -127,6 +132,20 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     mantissa, exponent = np.frexp(np.concatenate([rest, chosen, *between]))
     every = np.unique(np.ldexp(np.rint(np.ldexp(mantissa, FEW_BITS)), exponent - FEW_BITS))
     return np.asarray(1j * every), Slow(float(every[len(rest)]), float(own.min()))
+
+
+def _poles_at_origin(model: SecondOrderModel, sizes: FloatArray, slowest: float) -> tuple[int, bool]:
+    """Count the poles that should be at the origin, and say whether exactly: where no entry was rounded.
+
+    Otherwise those of free motions, or the poles that are slower than any by which rounding may have moved them.
+    """
+    P = np.stack([as_dense(part) for part in model.quadratics.P])
+    if P.shape[1] <= EXACTLY_COUNTED and has_short_entries(P):
+        degree = degree_of_determinant(P[::-1])  # of s^2n det P(1 / s), without the factors s of det P(s)
+        if degree >= 0:
+            return min(2 * P.shape[1] - degree, sizes.size), True
+    free = free_motion_count(model.M, model.C, model.K)
+    return (int(np.count_nonzero(sizes < slowest)) if free is None else free.poles), False
 
 
 def typical_speeds(model: SecondOrderModel) -> list[float]:
