@@ -216,12 +216,12 @@ ILL_CONDITIONED = (  # M is regular, but nearly singular in some direction acros
 
 @pytest.mark.parametrize(("kind", "size", "seed"), ILL_CONDITIONED)
 def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size: int, seed: int) -> None:
-    """States that are DOFs lose up to six digits of H(s) there, those of the default method do not: no warning."""
+    """States that are DOFs lose up to six digits of H(s) there, the default ones 6e-9 of a small channel at most."""
     generator = np.random.default_rng([seed, size])
     model = signals(generator, kind(generator, size))
-    exact, (reduction, lost) = rational_transfer(model), reduced_aloud(model)
+    exact, (reduction, _) = rational_transfer(model), reduced_aloud(model)
     assert reduction.method == "orthogonal"
-    assert not lost
+    assert reduction.solution.evidence.loss.value < 1e-8
     assert errors(complete(reduction), exact).max() <= 1e-9
 
 
