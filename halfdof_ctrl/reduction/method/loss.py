@@ -55,10 +55,11 @@ from halfdof_ctrl.reduction.method.refined_answers import (
 from halfdof_ctrl.reduction.method.signals import Signal
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-APART = 5.0  #: ratio of frequencies from which on a channel's values at both are compared: ...
+STEEP = 2.5  #: power of s beyond which a channel falls steeply, towards either end: there, ...
+STEEPEST = 3.0  #: ... a loss is measured by what it would be if it fell by this power ...
+APART = 5.0  #: ... from frequencies that are so many times lower or higher
 STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 AT_CORNER = 1.5  #: power of s by which a channel may rise or fall below what moves, where signals change their kind
-STEEPEST = 3.0  #: ... where it falls by a higher power than this one, towards either end, a loss is measured by that
 NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
@@ -165,7 +166,8 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     own = np.maximum(value, grown)
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
-    size = np.maximum(np.maximum(value, grown), _slopes_from(np.abs(at), value))
+    gentle = _is_gentle(np.abs(at), value, STEEP)
+    size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, _slopes_from(np.abs(at), value)))
     missed = np.where(_stays(np.abs(at), value, measurement.slow), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
@@ -200,20 +202,31 @@ def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
 
 
 def _stays(omega: FloatArray, value: FloatArray, slow: Slow) -> npt.NDArray[np.bool_]:
-    """Return which channels change no faster, to a point beside, than one that is looked at: below all that moves.
+    """Return which channels are looked at: below all that moves, those that change gently, and at rest, hardly at all.
 
-    Towards rest others fall or rise without end.
+    Others fall or rise without end there.
     """
-    lower, higher = value[:-1], value[1:]
-    ratio = np.divide(lower, higher, out=np.zeros_like(lower), where=higher > 0.0)
-    change = np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min))
-    at_rest = change < STAYS
-    gently = change < STAYS * ((omega[1:] / omega[:-1]) ** AT_CORNER)[:, None, None]
-    stays = np.ones(value.shape, dtype=np.bool_)
-    stays[:-1] = np.where((omega[:-1] < slow.least)[:, None, None], at_rest, gently)
-    stays[1:] |= np.where((omega[1:] < slow.least)[:, None, None], False, gently)  # noqa: FBT003
+    at_rest = (omega < slow.least)[:, None, None]
+    changes = _changes(value)
+    stays = _is_gentle(omega, value, AT_CORNER) & ~at_rest
+    stays[:-1] |= at_rest[:-1] & (changes < STAYS)
     stays[omega >= slow.typical] = True
     return stays
+
+
+def _is_gentle(omega: FloatArray, value: FloatArray, power: float) -> npt.NDArray[np.bool_]:
+    """Return where channels change, to the point below or above, by no higher power of s than that."""
+    gently = _changes(value) < STAYS * ((omega[1:] / omega[:-1]) ** power)[:, None, None]
+    gentle = np.zeros(value.shape, dtype=np.bool_)
+    gentle[:-1] |= gently
+    gentle[1:] |= gently
+    return gentle
+
+
+def _changes(value: FloatArray) -> FloatArray:
+    """Return the ratios of neighbouring values, the larger over the smaller."""
+    ratio = np.divide(value[:-1], value[1:], out=np.zeros_like(value[1:]), where=value[1:] > 0.0)
+    return np.asarray(np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min)))
 
 
 def _rounding_of_zeros(value: FloatArray) -> FloatArray:
