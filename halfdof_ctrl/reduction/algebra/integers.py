@@ -19,7 +19,11 @@ IntegerArray: TypeAlias = npt.NDArray[np.object_]
 PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
 ANY_POINT = 1_322_336_119  #: a remainder at which nothing happens but by chance
 UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
-SHIFTS = (1_234_567_891, 987_654_321, 19_937)  #: remainders at which a companion pencil is inverted, the first that can
+PENCIL_REMAINDERS = (
+    1_234_567_891,
+    987_654_321,
+    19_937,
+)  #: remainders at which a companion pencil is inverted, the first that can
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
 
@@ -174,7 +178,7 @@ def degree_of_determinant(coefficients: FloatArray) -> int:
     n = len(K)
     unit, none = np.eye(n, dtype=np.int64), np.zeros((n, n), dtype=np.int64)
     E = np.block([[unit, none], [none, M]])
-    for shift in SHIFTS:
+    for shift in PENCIL_REMAINDERS:
         shifted = np.block([[shift * unit, -unit], [K, (shift * M + C) % PRIME]]) % PRIME
         reduced, rank = _reduced(np.hstack([shifted, E]), 2 * n)
         if rank == 2 * n:

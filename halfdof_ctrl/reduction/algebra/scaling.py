@@ -29,7 +29,7 @@ OPEN_DIRECTION = 1e-12  #: of the largest singular value: directions in which th
 MOST_GRADIENT_STEPS = 2000  #: of conjugate gradients for the logarithmic factors of one matrix
 FULLY_SETTLED = 1e-20  #: of the first residual, squared, at which they stop
 ROUGHLY_SETTLED = 1e-8  #: the same where masses are compared, or a large matrix is scaled once more
-FEW_UNKNOWNS = 200  #: rows up to which the least squares with time are solved at once
+SOLVED_AT_ONCE = 200  #: rows up to which the least squares with time are solved at once
 DENSE_PATTERN_ROWS = 48  #: rows of a matrix whose pattern is multiplied as a dense matrix
 
 
@@ -139,7 +139,7 @@ def log_scaling_with_time(coefficients: FloatArray) -> tuple[FloatArray, FloatAr
     (n,) ndarray, (n,) ndarray, float
         r, c and t.
     """
-    if coefficients.shape[1] > FEW_UNKNOWNS:
+    if coefficients.shape[1] > SOLVED_AT_ONCE:
         return _many_logs_with_time(coefficients)
     present = coefficients != 0.0
     power, i, j = np.nonzero(present)

@@ -15,7 +15,7 @@ from halfdof_ctrl.reduction.algebra.integers import IntegerArray, as_floats, as_
 from halfdof_ctrl.reduction.method.refined_answers import Equations
 
 MORE_BITS = 400  #: after the last one of the numbers that were given
-LARGEST_EFFORT = 4e5  #: products of long numbers, a fifth of a second
+LONGEST_ELIMINATION = 4e5  #: products of long numbers, a fifth of a second
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +65,7 @@ def long_responses(equations: Equations, omegas: Sequence[float]) -> list[Comple
     [array([[0.+8.27180613e-25j]])]
     """
     n, m = equations.B[0].shape
-    affordable = int(LARGEST_EFFORT / max(1.0, 4.0 * n**2 * (n + m)))
+    affordable = int(LONGEST_ELIMINATION / max(1.0, 4.0 * n**2 * (n + m)))
     return [
         _response(*(_AtPoint.of(part, omega) for part in (equations.R, equations.B, equations.C, equations.D)))
         if k < affordable

@@ -56,18 +56,17 @@ from halfdof_ctrl.reduction.method.signals import Signal
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 STEEP = 2.5  #: power of s beyond which a channel falls steeply, towards either end: there, ...
-STEEPEST = 3.0  #: ... a loss is measured by what it would be if it fell by this power ...
+ENVELOPE_POWER = 3.0  #: ... a loss is measured by what it would be if it fell by this power ...
 APART = 5.0  #: ... from frequencies that are so many times lower or higher
 STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
-AT_CORNER = 1.5  #: power of s by which a channel may rise or fall below what moves, where signals change their kind
-NEIGHBOURS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
+SAME_UNITS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 UNCLEAR = 1e-10  #: of a value, or ...
 UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
 LONG_ZERO = 1e-60  #: of what a channel could be: less is nothing in hundreds of bits
-UNDETERMINED = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
+UNDETERMINED_VALUE = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
 ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
 SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
 ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
@@ -166,7 +165,7 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     own = np.maximum(value, grown)
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
-    gentle = _is_gentle(np.abs(at), value, STEEP)
+    gentle = _is_gentle(np.abs(at), value)
     size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, _slopes_from(np.abs(at), value)))
     missed = np.where(_stays(np.abs(at), value, measurement.slow), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
@@ -188,7 +187,7 @@ def _neighbours(points: ComplexArray) -> list[ComplexArray]:
     """Group points in rising order so that within a group unknowns are of a few sizes."""
     at, groups = np.abs(points), []
     while at.size:
-        near = int(np.searchsorted(at, NEIGHBOURS * at[0], side="right"))
+        near = int(np.searchsorted(at, SAME_UNITS * at[0], side="right"))
         groups.append(points[points.size - at.size :][:near])
         at = at[near:]
     return groups
@@ -197,7 +196,7 @@ def _neighbours(points: ComplexArray) -> list[ComplexArray]:
 def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
     """Return what channels would be at each point if they fell no more steeply than by s^3 from any other point."""
     ratio = np.maximum(omega, omega[:, None]) / np.minimum(omega, omega[:, None])
-    shares = np.where(ratio >= APART, ratio**-STEEPEST, 0.0)
+    shares = np.where(ratio >= APART, ratio**-ENVELOPE_POWER, 0.0)
     return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
 
 
@@ -208,15 +207,15 @@ def _stays(omega: FloatArray, value: FloatArray, slow: Slow) -> npt.NDArray[np.b
     """
     at_rest = (omega < slow.least)[:, None, None]
     changes = _changes(value)
-    stays = _is_gentle(omega, value, AT_CORNER) & ~at_rest
+    stays = _is_gentle(omega, value) & ~at_rest
     stays[:-1] |= at_rest[:-1] & (changes < STAYS)
     stays[omega >= slow.typical] = True
     return stays
 
 
-def _is_gentle(omega: FloatArray, value: FloatArray, power: float) -> npt.NDArray[np.bool_]:
-    """Return where channels change, to the point below or above, by no higher power of s than that."""
-    gently = _changes(value) < STAYS * ((omega[1:] / omega[:-1]) ** power)[:, None, None]
+def _is_gentle(omega: FloatArray, value: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return where channels change, to the point below or above, by no power of s that is steep."""
+    gently = _changes(value) < STAYS * ((omega[1:] / omega[:-1]) ** STEEP)[:, None, None]
     gentle = np.zeros(value.shape, dtype=np.bool_)
     gentle[:-1] |= gently
     gentle[1:] |= gently
@@ -318,7 +317,9 @@ class _Comparison:
         rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
         shape = (len(value), points.size, self.chosen.size)
         missed = np.abs(true.y - said.y)
-        looked_for = settled & (missed > UNSETTLED * (true.rounding + said.rounding)) & (moved <= UNDETERMINED * value)
+        looked_for = (
+            settled & (missed > UNSETTLED * (true.rounding + said.rounding)) & (moved <= UNDETERMINED_VALUE * value)
+        )
         missed = np.where(looked_for, missed, 0.0)
         parts = (missed, value, rounding, moved, grown)
         return Measured(*[np.moveaxis(part.reshape(shape), 1, 0) for part in parts])

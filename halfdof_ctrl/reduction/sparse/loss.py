@@ -36,7 +36,15 @@ from halfdof_ctrl.reduction.method.loss import (
     Measurement,
     Stored,
 )
-from halfdof_ctrl.reduction.method.loss_points import ALL_EIGENVALUES, BESIDE_MODE, Slow, beside_modes, loss_points
+from halfdof_ctrl.reduction.method.loss_points import (
+    ALL_EIGENVALUES,
+    BESIDE_MODE,
+    SLOW_MODES,
+    SLOW_MODES_ACCURACY,
+    Slow,
+    beside_modes,
+    loss_points,
+)
 from halfdof_ctrl.reduction.method.masses import own_speeds
 from halfdof_ctrl.reduction.method.refined_answers import (
     Equations,
@@ -50,22 +58,22 @@ from halfdof_ctrl.reduction.method.refined_answers import (
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, SparsePartition
 
 NOTHING_SLOW = Slow(0.0, 0.0)  #: no point is below what moves
-MEASURED_STATES = 4000  #: if most entries of A are filled: of more, nothing is measured
+FILLED_STATES = 4000  #: if most entries of A are filled: of more, nothing is measured
 MOST_OUTPUTS = 32  #: that are looked at, spread over all
 FACTORIZED_DOFS = 5000  #: up to which P(s) is factorized at each point, whatever the number of states
-FEW_STATES = 300  #: of more, so it is in any case
-LARGE = 20_000  #: DOFs from which on few points are looked at, and a mixture of the inputs first
+STATES_BY_W = 300  #: of more, so it is in any case
+MIXED_FROM = 20_000  #: DOFs from which on few points are looked at, and a mixture of the inputs first
 FILLED = 2**18  #: entries of A, above which few points are looked at as well
 POINTS_OF_LARGE = 2  #: of many states; of few, one
 NOTHING_MOVES = 1e-200  #: of the largest unknown: smaller ones are zero, so that no power of two overflows
 LOOKED_CLOSER = 1e-10  #: part of a value from which more is asked about a loss
-UNKNOWN = 1e-9  #: part of a value that is no small part of its terms: what is known to less is not told from a loss
+NOT_TOLD_APART = (
+    1e-9  #: part of a value that is no small part of its terms: what is known to less is not told from a loss
+)
 STILL_KNOWN = 1e-3  #: part of a value: what is known to less is lost, or is asked of P(s) itself
-BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
-SLOW_MODES = 6  #: of many states, that are looked for
-SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
-NEARLY_FREE = 1e-15  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free
-BESIDE_ORIGIN = 1e-3  #: of the slowest frequency of a mass by itself: where slow modes are looked for if one is free
+POINTS_BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
+NO_STIFFNESS = 1e-15  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free
+BESIDE_FREE = 1e-3  #: of the slowest frequency of a mass by itself: where slow modes are looked for if one is free
 REACHED = 16.0  #: times that: modes of larger size are not told from free ones there
 
 
@@ -87,10 +95,10 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
     """
     model, N = stored.model, len(stored.A)
     filled = np.count_nonzero(stored.A)
-    if not N or (N > MEASURED_STATES and filled > MEASURED_STATES**2):
+    if not N or (N > FILLED_STATES and filled > FILLED_STATES**2):
         return Measurement(model, np.zeros(0, dtype=np.intp), NOTHING_SLOW, ())
     model, m = _with_few_outputs(model), len(model.inputs)
-    large, by_W = len(model.dofs) > LARGE, len(model.dofs) > FACTORIZED_DOFS and N <= FEW_STATES
+    large, by_W = len(model.dofs) > MIXED_FROM, len(model.dofs) > FACTORIZED_DOFS and N <= STATES_BY_W
     chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
     first = _mixture(stored.B) if large else _picked(chosen, m)
     comparison = _Comparison.of(stored, model, first, by_W=by_W)
@@ -191,7 +199,7 @@ class _Comparison:
             return slow
         least, typical = np.sqrt(np.quantile(speeds[speeds > 0.0], (0.0, 0.5)))
         between: Any = (
-            np.geomspace(np.abs(slow).min(), typical, BETWEEN + 2)[1:-1] if np.abs(slow).min() < typical else []
+            np.geomspace(np.abs(slow).min(), typical, POINTS_BETWEEN + 2)[1:-1] if np.abs(slow).min() < typical else []
         )
         return np.concatenate(
             [slow[:1], slow[1:][-1:], 1j * BESIDE_MODE * np.array([typical, *between, least]), slow[1:-1]]
@@ -205,12 +213,12 @@ class _Comparison:
             grown = np.abs(
                 motion(np.random.default_rng(0).uniform(1.0, 2.0, (len(self.scaling.rows), 1)).astype(np.complex128))
             ).max()
-            is_free = not NEARLY_FREE * grown < 1.0
+            is_free = not NO_STIFFNESS * grown < 1.0
         except np.linalg.LinAlgError:
             is_free = True
         if is_free:
             slowest = float(np.sqrt(speeds[speeds > 0.0].min())) if (speeds > 0.0).any() else 1.0
-            shift = -BESIDE_ORIGIN * slowest
+            shift = -BESIDE_FREE * slowest
             least = REACHED * EPS**0.5 * slowest
             motion = self._pencil(shift)
         solve = lifted(self.stored, self._physical(motion), shift)
@@ -276,7 +284,9 @@ class _Comparison:
         value, missed = np.abs(true.y), np.abs(true.y - said.y)
         told = missed > UNSETTLED * (true.rounding + said.rounding)
         told |= _is_lost(said) & ~_is_lost(true)
-        told |= (true.rounding > UNKNOWN * value) & (value > SMALL_CHANNEL * true.shown)  # the best that is known
+        told |= (true.rounding > NOT_TOLD_APART * value) & (
+            value > SMALL_CHANNEL * true.shown
+        )  # the best that is known
         missed = np.where(told, missed, 0.0)
         moved = np.zeros(missed.shape)
         if (missed > LOOKED_CLOSER * value).any():

@@ -143,7 +143,7 @@ def test_states_follow_from_what_solves_with_the_pencil() -> None:
 
 def test_large_models_are_looked_at_by_a_mixture_of_their_inputs(monkeypatch: pytest.MonkeyPatch) -> None:
     """With few states and the factors of W: an even chain loses nothing, one of soft and stiff springs is found out."""
-    monkeypatch.setattr(sparse_loss, "LARGE", 500)
+    monkeypatch.setattr(sparse_loss, "MIXED_FROM", 500)
     monkeypatch.setattr(sparse_loss, "FACTORIZED_DOFS", 500)
     masses = np.where(np.arange(600) % 60 == 0, 1.0, 0.0)
     M, C, K = chain(np.ones(599), masses, np.zeros(599))
