@@ -5,6 +5,7 @@ import pickle
 import re
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
@@ -232,17 +233,21 @@ def test_an_error_of_the_executor_is_that_of_the_case() -> None:
 def test_ctrl_c_takes_back_what_an_executor_has_not_begun() -> None:
     """What it is at goes on, and the executor stays open."""
     begun: list[int] = []
+    stopped = threading.Event()
 
     def interrupting(x: int) -> int:
         begun.append(x)
         if x == 3:
             os.kill(os.getpid(), signal.SIGINT)
-        time.sleep(1.1 * CHUNK_SECONDS if x != 3 else 2.0)  # a chunk is one case; and time to be stopped
+            stopped.wait(60.0)
+        else:
+            time.sleep(1.1 * CHUNK_SECONDS)  # a chunk is one case
         return x
 
     with ThreadPoolExecutor(1) as executor:
         with pytest.raises(SweepInterruptedError) as stop:
             sweep(interrupting, {"x": range(COUNT)}, executor=executor)
+        stopped.set()
         assert executor.submit(int, "7").result() == 7
     result: Any = stop.value.result
     assert_array_equal(result.values[:3], np.arange(3))

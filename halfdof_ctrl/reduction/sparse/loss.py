@@ -67,9 +67,7 @@ FILLED = 2**18  #: entries of A, above which few points are looked at as well
 POINTS_OF_LARGE = 2  #: of many states; of few, one
 NOTHING_MOVES = 1e-200  #: of the largest unknown: smaller ones are zero, so that no power of two overflows
 LOOKED_CLOSER = 1e-10  #: part of a value from which more is asked about a loss
-NOT_TOLD_APART = (
-    1e-9  #: part of a value that is no small part of its terms: what is known to less is not told from a loss
-)
+NOT_TOLD_APART = 1e-9  #: part of a value that is no small part of its terms: to which it is not told from a loss
 STILL_KNOWN = 1e-3  #: part of a value: what is known to less is lost, or is asked of P(s) itself
 POINTS_BETWEEN = 3  #: points between the slowest mode and where half of the masses would swing alone
 NO_STIFFNESS = 1e-15  #: part of the largest entry of a row of K, scaled: a motion that so little resists is free

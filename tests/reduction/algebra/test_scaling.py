@@ -120,7 +120,7 @@ def test_many_rows_are_scaled_as_few_are(monkeypatch: pytest.MonkeyPatch) -> Non
     units = 10.0 ** generator.uniform(-3.0, 3.0, (2, 12))
     P = np.stack([1e4 * chain, 0.1 * chain, np.diag(generator.uniform(1.0, 9.0, 12))]) * units[0][:, None] * units[1]
     few = log_scaling_with_time(P)
-    monkeypatch.setattr(scaling, "FEW_UNKNOWNS", 1)
+    monkeypatch.setattr(scaling, "SOLVED_AT_ONCE", 1)
     many = log_scaling_with_time(P)
     assert_allclose(many[2], few[2], atol=ITERATED)
     assert_allclose(many[0][:, None] + many[1], few[0][:, None] + few[1], atol=ITERATED)
