@@ -3,10 +3,11 @@
 import numpy as np
 import numpy.typing as npt
 
-from halfdof_ctrl.base.arrays import ComplexArray
+from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
 from halfdof_ctrl.systems.refined_poles import RefinedPoles
 
 SMALL_EIGENVALUE = 1e-6  #: of the largest or the typical frequency: eigenvalues below may stand for one at the origin
+SURELY_AWAY = 100.0  #: times its bound: an eigenvalue beyond that is not at the origin
 EIGENVALUE_AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
 GRID_POINTS = 60  #: points on the axis besides those at the poles
@@ -15,16 +16,20 @@ MOST_POLE_POINTS = 100  #: poles that get a point of their own
 OFF_AXIS = (1.0 + 0.0j, 1.0 + 1.0j)  #: directions of the points off the axis, in units of a pole's size
 
 
-def moving_eigenvalues(finite: ComplexArray, poles: RefinedPoles, gamma: float) -> ComplexArray:
+def moving_eigenvalues(finite: ComplexArray, bounds: FloatArray, poles: RefinedPoles, gamma: float) -> ComplexArray:
     """Leave out eigenvalues at the origin, which QZ finds at the square root of rounding where they are double.
 
-    One counts as at the origin if it is small and its nearest pole of the state space is zero to what A tells.
+    One counts as at the origin if it is small, its nearest pole of the state space is zero to what A tells, and its own
+    bound does not keep it from there: beside a half DOF of 1e13 rad/s A tells of no slow pole that it is not zero.
     Where none is left, the model's typical frequency stands for the time scale.
     """
-    away = finite[np.abs(finite) > EIGENVALUE_AT_ORIGIN * gamma]
+    kept = np.abs(finite) > EIGENVALUE_AT_ORIGIN * gamma
+    kept |= bounds * SURELY_AWAY < np.abs(finite)
+    away, bounds = finite[kept], bounds[kept]
     if poles.values.size and away.size:
         nearest = np.abs(away[:, None] - poles.values).argmin(axis=1)
-        away = away[~(_is_small(away, gamma) & poles.at_origin[nearest])]
+        at_origin = _is_small(away, gamma) & poles.at_origin[nearest]
+        away = away[~(at_origin & (np.abs(away) <= SURELY_AWAY * bounds))]
     return np.asarray(away) if away.size else np.array([-gamma + 0.0j])
 
 

@@ -127,7 +127,7 @@ def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
         told = slice(None if sys.nstates >= structure.finite_eigenvalues.size else structure.fewest_finite)
         finite, bounds = structure.finite_eigenvalues[told], structure.bounds[told]
         poles, gamma = refined_poles(np.asarray(sys.A, dtype=float)), typical_frequency(model)
-        moving = moving_eigenvalues(finite, poles, gamma)
+        moving = moving_eigenvalues(finite, bounds, poles, gamma)
         points = check_points(moving, most)
         transfer = compare_transfer(model, sys, points, *transfer_of_both(model, sys, points, advance))
         of_poles = compare_poles(model, poles, finite, bounds, gamma, most=structure.most_finite)

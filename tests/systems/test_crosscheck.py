@@ -513,3 +513,14 @@ def test_an_integration_that_rounding_runs_away_with_is_not_followed(
     assert "not followed" in repr(check)
     wrong = control.StateSpace(sys.A * (1 + 1e-6), sys.B, sys.C, sys.D)
     assert crosscheck(model, wrong).verdict == "failed"
+
+
+def test_slow_motion_is_looked_at_beside_a_half_dof_that_is_fast_beyond_all_digits() -> None:
+    """Poles near 1.4 rad/s beside one of 2e13, of which A says no more than that they are small."""
+    model = mechss(np.diag([1.0, 0, 0]), np.diag([0.1, 1e-13, 0.5]), [[3, -1, -1], [-1, 2, 0], [-1, 0, 2]])
+    sys = mech2ss(model)
+    A = np.array(sys.A)
+    A[tuple(np.argwhere(np.isclose(A, -3.0))[0])] *= 1.001
+    check = crosscheck(model, control.ss(A, sys.B, sys.C, sys.D))
+    assert crosscheck(model, sys).passed
+    assert check.transfer_grade == Grade.FAILED
