@@ -201,7 +201,9 @@ def _loses_nothing(found: SingleSolve) -> bool:
     if not found.leading.is_plainly_regular or part.basis is not None:
         return False
     if len(found.A) <= ASKED_STATES:
-        return loses_nothing(found.model, found.equations, even=found.is_even) or _is_bounded(found)
+        may_cancel = part.n_static > 0 and len(found.A) > 0  # what static DOFs leave of K, to rounding
+        nothing = not may_cancel and loses_nothing(found.model, found.equations, even=found.is_even)
+        return nothing or _is_bounded(found)
     inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
     inertial[part.order[: part.n_inertial]] = True
     return not spread_is_wide(found.model, inertial)
