@@ -12,7 +12,7 @@ from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import NULL_VECTOR_SHARE
 from halfdof_ctrl.reduction.algebra.integers import has_short_entries
-from halfdof_ctrl.reduction.algebra.leading_matrix import SINGULAR_RCOND, SURELY_REGULAR, LeadingMatrix
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, SINGULAR_RCOND, SURELY_REGULAR, LeadingMatrix
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling, unit_free_scaling
 from halfdof_ctrl.reduction.dense.bases import orthonormal_bases
 from halfdof_ctrl.reduction.dense.partition import DofPartition
@@ -201,7 +201,8 @@ def _loses_nothing(found: SingleSolve) -> bool:
     if not found.leading.is_plainly_regular or part.basis is not None:
         return False
     if len(found.A) <= ASKED_STATES:
-        may_cancel = part.n_static > 0 and len(found.A) > 0  # what static DOFs leave of K, to rounding
+        few = len(found.model.dofs) <= FEW_DOFS  # of more, a measurement takes several reductions
+        may_cancel = few and part.n_static > 0 and len(found.A) > 0  # what static DOFs leave of K, to rounding
         nothing = not may_cancel and loses_nothing(found.model, found.equations, even=found.is_even)
         return nothing or _is_bounded(found)
     inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
