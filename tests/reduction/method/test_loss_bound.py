@@ -54,6 +54,6 @@ def test_ordinary_chains_are_bounded_and_beams_are_not() -> None:
 def test_what_static_dofs_leave_of_a_free_body_is_looked_at() -> None:
     """A free mass, whose equation is that of a massless node: A holds rounding in the place of an exact zero."""
     M = [[0, 0, 0], [0, 0, 2.0**-20], [0, 0, 0]]
-    found = exact_reduction(mechss(M, None, [[5, -1, -4], [-1, 1, 0], [-4, 0, 4]], F=np.eye(3)[:1])).solution
+    found = exact_reduction(mechss(np.array(M), None, [[5, -1, -4], [-1, 1, 0], [-4, 0, 4]], F=np.eye(3)[:1])).solution
     assert isinstance(found, SingleSolve)
     assert found.evidence.loss.omega > 0.0
