@@ -19,11 +19,7 @@ IntegerArray: TypeAlias = npt.NDArray[np.object_]
 PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
 ANY_POINT = 1_322_336_119  #: a remainder at which nothing happens but by chance
 UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
-PENCIL_REMAINDERS = (
-    1_234_567_891,
-    987_654_321,
-    19_937,
-)  #: remainders at which a companion pencil is inverted, the first that can
+PENCIL_REMAINDERS = (1_234_567_891, 987_654_321, 19_937)  #: at which a companion pencil is inverted, the first that can
 LARGEST_EXACT = 60  #: equations up to which row operations and determinants are exact
 
 
@@ -102,7 +98,8 @@ def least_rank(values: FloatArray) -> int:
     >>> least_rank(np.array([[1.0, 1.0], [1.0, 1.0 + 2.0**-50]])), least_rank(np.ones((2, 2)))
     (2, 1)
     """
-    return len(independent_of(as_integers(values)[0], range(len(values))))
+    work = np.asarray(as_integers(values)[0] % PRIME, dtype=np.int64)
+    return _reduced(work, work.shape[1])[1]
 
 
 def independent_of(matrix: IntegerArray, order: Iterable[int], most: int | None = None) -> list[int]:
@@ -155,7 +152,7 @@ def is_regular(coefficients: FloatArray) -> bool:
     value = np.zeros_like(remainders[0])
     for part in remainders[::-1]:
         value = (value * ANY_POINT + part) % PRIME
-    return len(independent_of(value.astype(object), range(len(value)))) == len(value)
+    return _reduced(value, len(value))[1] == len(value)
 
 
 def degree_of_determinant(coefficients: FloatArray) -> int:

@@ -55,8 +55,8 @@ class ExactRows(RowSystem):
     exact: bool  #: whether the numbers given are short, all that counted as zero was zero, and nothing was rounded
 
     @classmethod
-    def of(cls, system: RowSystem, bits: int = SHORT_BITS) -> "ExactRows":
-        """Take a system as it is, before any row operation; numbers of so many bits are meant to the last one."""
+    def of(cls, system: RowSystem) -> "ExactRows":
+        """Take a system as it is, before any row operation."""
         found = [as_integers(system.coefficients[:, i]) for i in range(system.size)]
         return cls(
             coefficients=system.coefficients,
@@ -68,7 +68,7 @@ class ExactRows(RowSystem):
             powers=tuple([power for _, power in found]),
             operations=np.eye(system.size)[None],
             given=system.coefficients,
-            exact=has_short_entries(system.coefficients, bits),
+            exact=has_short_entries(system.coefficients, SHORT_BITS),
         )
 
     def replaced(self, offsets: Offsets, eliminations: list[Elimination], caution: Caution) -> "ExactRows":

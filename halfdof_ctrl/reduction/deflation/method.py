@@ -24,7 +24,7 @@ from halfdof_ctrl.base.errors import SingularLeadingMatrixError, SingularPencilE
 from halfdof_ctrl.base.names import listed
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.model.singular import causes, null_spaces, singular_pencil_error
-from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, UNROUNDED_BITS
+from halfdof_ctrl.reduction.algebra.integers import LARGEST_EXACT, has_short_entries
 from halfdof_ctrl.reduction.deflation.exact_rows import ExactRows
 from halfdof_ctrl.reduction.deflation.exact_solution import solved_without_rounding
 from halfdof_ctrl.reduction.deflation.offsets import Offsets
@@ -200,7 +200,7 @@ def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caut
         yield system, CAUTIONS[0]
     if rows is not None:
         yield rows, CAUTIONS[0]
-        yield ExactRows.of(system, UNROUNDED_BITS), AS_GIVEN
+        yield replace(rows, exact=has_short_entries(rows.coefficients)), AS_GIVEN
     for caution in CAUTIONS:
         yield system, caution
 
