@@ -36,6 +36,7 @@ from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.method.long_answers import long_responses
 from halfdof_ctrl.reduction.method.loss_points import (
+    NOTHING_SLOW,
     Slow,
     loss_points,
     points_of_few,
@@ -47,10 +48,11 @@ from halfdof_ctrl.reduction.method.refined_answers import (
     Response,
     Solver,
     StateSolver,
+    moved_by_rounding,
     pencil_solver,
     refined_response,
     sizes_at,
-    sizes_of_terms,
+    state_equations,
 )
 from halfdof_ctrl.reduction.method.signals import Signal
 
@@ -61,7 +63,6 @@ APART = 5.0  #: ... from frequencies that are so many times lower or higher
 STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 SAME_UNITS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
-TRIED_ROUNDINGS = 2  #: of M, C, K at random
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
 UNCLEAR = 1e-10  #: of a value, or ...
 UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
@@ -228,6 +229,19 @@ def _changes(value: FloatArray) -> FloatArray:
     return np.asarray(np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min)))
 
 
+def looked_at(count: int, most: int) -> IndexArray:
+    """Choose some of many, spread over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
+
+
+def rounding_of_channels(true: Response, moved: FloatArray) -> FloatArray:
+    """Return below which size values are zero: by sums, and of a small channel, by rounding of M, C, K."""
+    rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
+    small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
+    is_zero = (value <= np.minimum(small, most)) & (most <= small)
+    return np.asarray(np.where(is_zero, np.maximum(rounding, most), rounding))
+
+
 def _rounding_of_zeros(value: FloatArray) -> FloatArray:
     """Return below which size a channel is zero but for rounding at each point, in units of rows and columns."""
     rows = value.max(axis=2, keepdims=True)
@@ -251,7 +265,7 @@ class _Comparison:
     @classmethod
     def of(cls, stored: Stored) -> "_Comparison":
         model, m, N = stored.model, stored.B.shape[1], len(stored.A)
-        chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
+        chosen = looked_at(m, MOST_INPUTS)
         few = len(model.dofs) <= FEW_DOFS
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
         points = points[np.argsort(np.abs(points))]
@@ -268,13 +282,8 @@ class _Comparison:
         (A, scale), output = balanced_states(stored.A), stored.output(model)
         into = stored.B[:, chosen] * inputs / scale[:, None]
         direct = [part[:, chosen] * inputs for part in output.U] or [np.zeros((len(output.X), chosen.size))]
-        states = Equations(
-            R=[as_it_is(-A), as_it_is(np.eye(N))],
-            B=[into, np.zeros_like(into)],
-            C=[output.X * scale, *[np.zeros_like(output.X) for _ in direct[1:]]],
-            D=direct,
-        )
-        slow = Slow(0.0, 0.0)
+        states = state_equations(A, into, output.X * scale, direct)
+        slow = NOTHING_SLOW
         if few:
             points, slow = points_of_few(model, stored.A, _speeds_of_signals(motion))
         return cls(
@@ -309,12 +318,12 @@ class _Comparison:
         u = np.tile(np.eye(self.chosen.size, dtype=np.complex128), points.size)
         said = refined_response(self.states, solver.balanced_solve, s, u)
         true = refined_response(self.motion, answer, s, u)
-        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], s, u)
+        grown = self.states.grown(s, u)
         settled = self._settled(points, said, true, grown)
-        rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
-        moved = self._undetermined(answer, points, s, true)
-        small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
-        rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
+        value, moved = np.abs(true.y), np.zeros(true.y.shape)
+        if not self.unrounded:
+            moved = moved_by_rounding(self.motion, answer, points, s, true.x)
+        rounding = rounding_of_channels(true, moved)
         shape = (len(value), points.size, self.chosen.size)
         missed = np.abs(true.y - said.y)
         looked_for = (
@@ -353,16 +362,6 @@ class _Comparison:
         """Return what gives the answer of all DOFs in the scaled units."""
         (rows, columns), answer = self.scaling, self.stored.answers(states)
         return lambda force: np.asarray(answer(force / rows[:, None]) / columns[:, None])
-
-    def _undetermined(self, answer: Solver, points: ComplexArray, s: ComplexArray, true: Response) -> FloatArray:
-        """Return what rounding of M, C, K at random changes in the outputs: nothing where they were not rounded."""
-        if self.unrounded:
-            return np.zeros(true.y.shape)
-        terms = sizes_of_terms(self.motion.R, s, true.x).reshape(len(true.x), points.size, 1, -1)
-        signs = np.random.default_rng(0).uniform(-1.0, 1.0, (*terms.shape[:2], TRIED_ROUNDINGS, terms.shape[3]))
-        force = (EPS * terms * signs).reshape(len(true.x), -1).astype(np.complex128)  # of each point side by side
-        changes = np.abs(self.motion.seen(np.repeat(points, force.shape[1] // points.size), answer(force)))
-        return np.asarray(changes.reshape(len(changes), *signs.shape[1:]).max(axis=2).reshape(len(changes), -1))
 
 
 def _speeds_of_signals(motion: Equations) -> list[float]:

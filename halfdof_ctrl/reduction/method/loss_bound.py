@@ -70,7 +70,7 @@ def loses_nothing(model: SecondOrderModel, equations: StateEquations, *, even: b
     if not q.U and plain:
         return True
     x = np.asarray(scale * np.linalg.solve(A, equations.B / scale))
-    return _is_kept(q, x) and (plain or _are_seen(model, equations, x))
+    return (not q.U or are_kept(q, x)) and (plain or _are_seen(model, equations, x))
 
 
 def is_bounded(model: SecondOrderModel, equations: StateEquations, output: Signal, errors: StateEquations) -> bool:
@@ -138,24 +138,21 @@ def _points(A: FloatArray) -> ComplexArray:
     return np.asarray(1j * BESIDE_MODE * np.sort(np.append(modes, between)))
 
 
-def _is_kept(q: Signal, x: FloatArray) -> bool:
-    """Return whether displacements at rest, -x times inputs, are no small differences of their parts."""
-    if not q.U:
-        return True
-    terms = np.abs(q.X) @ np.abs(x) + np.abs(q.U[0])
-    left = np.abs(q.U[0] - q.X @ x).max(axis=0, initial=0.0)
-    return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left).all())
+def are_kept(signal: Signal, x: FloatArray) -> bool:
+    """Return whether signals at rest, where states are -x times inputs, are no small differences of their parts."""
+    direct = signal.direct(x.shape[1])
+    terms = (np.abs(signal.X) @ np.abs(x) + np.abs(direct)).max(axis=0, initial=0.0)
+    return bool((terms <= EVEN_STATES * np.abs(direct - signal.X @ x).max(axis=0, initial=0.0)).all())
 
 
 def _are_seen(model: SecondOrderModel, equations: StateEquations, x: FloatArray) -> bool:
     """Return whether outputs that mix displacements with others are no small differences of their parts at rest."""
-    F, D = model.quadratics.F, np.asarray(model.quadratics.D[0])
-    terms, left = np.abs(D), D
+    F, D, q = model.quadratics.F, np.asarray(model.quadratics.D[0]), equations.displacement
+    terms, left = np.abs(D), D + F[0] @ (q.direct(x.shape[1]) - q.X @ x)
     for k, part in enumerate(F):
-        motion = equations.motion(k)
-        direct = motion.U[0] if motion.U else np.zeros((len(motion.X), x.shape[1]))
-        terms = terms + np.abs(part) @ (np.abs(motion.X) @ np.abs(x) + np.abs(direct))
-        left = left + F[0] @ (direct - motion.X @ x) if k == 0 else left
+        if part.any():
+            motion = equations.motion(k)
+            terms = terms + np.abs(part) @ (np.abs(motion.X) @ np.abs(x) + np.abs(motion.direct(x.shape[1])))
     mixed = np.asarray(F[0].any(axis=1))[:, None] | (D != 0.0)
     return bool((~mixed | (terms <= EVEN_STATES * np.abs(left))).all())
 

@@ -97,6 +97,9 @@ class Slow(NamedTuple):
     typical: float  #: of what moves
 
 
+NOTHING_SLOW = Slow(0.0, 0.0)
+
+
 def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> tuple[ComplexArray, Slow]:
     """Choose points for a model of few DOFs, and say which are slow for it.
 

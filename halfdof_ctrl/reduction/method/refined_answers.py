@@ -9,16 +9,17 @@ from typing import Any, TypeAlias
 
 import numpy as np
 from scipy.linalg.lapack import zgetrf, zgetrs
-from scipy.sparse import csc_array, diags_array, hstack
+from scipy.sparse import csc_array, diags_array, eye_array, hstack
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, as_dense, powers_of_two
-from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
+from halfdof_ctrl.base.exact_products import SMALL_MATRIX, ExactPolynomial, as_it_is
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.scaling import max_scaling
 
 Solver: TypeAlias = Callable[[ComplexArray], ComplexArray]
 
+TRIED_ROUNDINGS = 2  #: of coefficients at random
 MOST_ANSWER_CORRECTIONS = 4  #: of a solution
 CORRECTED = 1e-22  #: of what is seen: a smaller correction is the last one
 STUCK_SHARE = 0.3  #: of a correction, that the next one must be below, ...
@@ -44,6 +45,10 @@ class Equations:
     def sizes(self, s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:
         """Return the sizes of the terms of that."""
         return sizes_of_terms(self.C, s, x)
+
+    def grown(self, s: ComplexArray, u: ComplexArray) -> FloatArray:
+        """Return the sizes of what passes directly and grows with frequency."""
+        return sizes_of_terms([np.zeros_like(self.D[0]), *self.D[1:]], s, u)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -115,6 +120,36 @@ def _noise_of_residuals(
     terms = SETTLED_DIGIT * (sizes_of_terms(equations.R, s, x) + sizes_of_terms(equations.B, s, u))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], terms.shape)
     return NOISE_DEVIATION * np.abs(equations.seen(s, solve((signs * terms).astype(np.complex128))))
+
+
+def state_equations(A: FloatArray, B: FloatArray, C: FloatArray, D: Sequence[FloatArray]) -> Equations:
+    """Return ``(s I - A) x = B u`` and ``y = C x + D(s) u``."""
+    N, none = len(A), [np.zeros_like(C) for _ in D[1:]]
+    unit = np.eye(N) if N**2 <= SMALL_MATRIX else csc_array(eye_array(N))
+    return Equations(R=[as_it_is(-A), unit], B=[B, np.zeros_like(B)], C=[C, *none], D=D)
+
+
+def moved_by_rounding(
+    motion: Equations, answer: Solver, points: ComplexArray, s: ComplexArray, x: ComplexArray
+) -> FloatArray:
+    """Return what rounding of the coefficients of R at random changes in the outputs.
+
+    Parameters
+    ----------
+    motion : Equations
+    answer : callable
+        Gives ``R(s)^-1`` times an (n, k) array, its columns at the points in turn.
+    points : (l,) complex ndarray
+    s : (k,) complex ndarray
+        Where the columns of x are: as many at each point.
+    x : (n, k) complex ndarray
+        Their solutions.
+    """
+    terms = sizes_of_terms(motion.R, s, x).reshape(len(x), points.size, 1, -1)
+    signs = np.random.default_rng(0).uniform(-1.0, 1.0, (*terms.shape[:2], TRIED_ROUNDINGS, terms.shape[3]))
+    force = (EPS * terms * signs).reshape(len(x), -1).astype(np.complex128)  # of each point side by side
+    changes = np.abs(motion.seen(np.repeat(points, force.shape[1] // points.size), answer(force)))
+    return np.asarray(changes.reshape(len(changes), *signs.shape[1:]).max(axis=2).reshape(len(changes), -1))
 
 
 def sizes_of_terms(coefficients: Sequence[Matrix], s: ComplexArray, x: ComplexArray | FloatArray) -> FloatArray:

@@ -15,11 +15,10 @@ from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.sparse import csc_array, eye_array
+from scipy.sparse import csc_array
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, powers_of_two
-from halfdof_ctrl.base.exact_products import as_it_is
 from halfdof_ctrl.base.sparse_arrays import SparseMatrix, as_sparse
 from halfdof_ctrl.base.sparse_factors import PIVOTINGS, sparse_lu
 from halfdof_ctrl.base.spectrum import balanced_states
@@ -29,19 +28,20 @@ from halfdof_ctrl.reduction.algebra.sparse_lu import is_nearly_symmetric
 from halfdof_ctrl.reduction.method.loss import (
     MOST_INPUTS,
     SMALL_CHANNEL,
-    TRIED_ROUNDINGS,
     UNSETTLED,
     ZERO_CHANNEL,
     Measured,
     Measurement,
     Stored,
+    looked_at,
+    rounding_of_channels,
 )
 from halfdof_ctrl.reduction.method.loss_points import (
     ALL_EIGENVALUES,
     BESIDE_MODE,
+    NOTHING_SLOW,
     SLOW_MODES,
     SLOW_MODES_ACCURACY,
-    Slow,
     beside_modes,
     loss_points,
 )
@@ -51,13 +51,13 @@ from halfdof_ctrl.reduction.method.refined_answers import (
     Response,
     Solver,
     StateSolver,
+    moved_by_rounding,
     refined_response,
     sizes_at,
-    sizes_of_terms,
+    state_equations,
 )
 from halfdof_ctrl.reduction.sparse.partition import HALF, INERTIAL, SparsePartition
 
-NOTHING_SLOW = Slow(0.0, 0.0)  #: no point is below what moves
 FILLED_STATES = 4000  #: if most entries of A are filled: of more, nothing is measured
 MOST_OUTPUTS = 32  #: that are looked at, spread over all
 FACTORIZED_DOFS = 5000  #: up to which P(s) is factorized at each point, whatever the number of states
@@ -97,7 +97,7 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
         return Measurement(model, np.zeros(0, dtype=np.intp), NOTHING_SLOW, ())
     model, m = _with_few_outputs(model), len(model.inputs)
     large, by_W = len(model.dofs) > MIXED_FROM, len(model.dofs) > FACTORIZED_DOFS and N <= STATES_BY_W
-    chosen = np.unique(np.linspace(0, m - 1, min(m, MOST_INPUTS)).astype(np.intp))
+    chosen = looked_at(m, MOST_INPUTS)
     first = _mixture(stored.B) if large else _picked(chosen, m)
     comparison = _Comparison.of(stored, model, first, by_W=by_W)
     points = comparison.points()
@@ -119,10 +119,9 @@ def _is_suspect(mixture: "_Comparison", points: ComplexArray) -> bool:
 
 def _with_few_outputs(model: SecondOrderModel) -> SecondOrderModel:
     """Return a model with some of its outputs, where these are many."""
-    p = len(model.outputs)
-    if p <= MOST_OUTPUTS:
+    if len(model.outputs) <= MOST_OUTPUTS:
         return model
-    places = np.linspace(0, p - 1, MOST_OUTPUTS).astype(np.intp)
+    places = looked_at(len(model.outputs), MOST_OUTPUTS)
     return model.select(outputs=[model.outputs[place] for place in places.tolist()])
 
 
@@ -153,7 +152,6 @@ class _Comparison:
 
     @classmethod
     def of(cls, stored: SparselyStored, model: SecondOrderModel, mix: SparseMatrix, *, by_W: bool) -> "_Comparison":
-        N = len(stored.A)
         speeds = own_speeds(model)
         speed = float(np.sqrt(np.median(speeds[speeds > 0.0]))) if (speeds > 0.0).any() else 1.0
         P = [as_sparse(part) for part in model.quadratics.P]
@@ -171,12 +169,7 @@ class _Comparison:
         (A, balance), output = balanced_states(stored.A), stored.output(model)
         into = np.asarray(stored.B @ mix) * inputs / balance[:, None]
         direct = [np.asarray(part @ mix) * inputs for part in output.U] or [np.zeros((len(output.X), inputs.size))]
-        states = Equations(
-            R=[as_it_is(-A), csc_array(eye_array(N))],
-            B=[into, np.zeros_like(into)],
-            C=[output.X * balance, *[np.zeros_like(output.X) for _ in direct[1:]]],
-            D=direct,
-        )
+        states = state_equations(A, into, output.X * balance, direct)
         return cls(
             stored=stored,
             by_W=by_W,
@@ -288,11 +281,9 @@ class _Comparison:
         missed = np.where(told, missed, 0.0)
         moved = np.zeros(missed.shape)
         if (missed > LOOKED_CLOSER * value).any():
-            moved = self._undetermined(answer, points, true)
-        rounding, small, most = ZERO_CHANNEL * true.rounding, SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
-        rounding = np.where((value <= np.minimum(small, most)) & (most <= small), np.maximum(rounding, most), rounding)
-        grown = sizes_of_terms([np.zeros_like(self.states.D[0]), *self.states.D[1:]], points, u)
-        return Measured(*[part[None] for part in (missed, value, rounding, moved, grown)])
+            moved = moved_by_rounding(self.motion, answer, points[:1], points, true.x)
+        parts = (missed, value, rounding_of_channels(true, moved), moved, self.states.grown(points, u))
+        return Measured(*[part[None] for part in parts])
 
     def _solvers(self, s: complex) -> tuple[Solver, Solver]:
         """Return what answers for all DOFs, scaled, and for the balanced states."""
@@ -329,13 +320,6 @@ class _Comparison:
             msg = "s is an eigenvalue"
             raise np.linalg.LinAlgError(msg) from singular
         return lambda right: _without_dust(factors.solve(np.asarray(right, dtype=np.complex128)))
-
-    def _undetermined(self, answer: Solver, s: ComplexArray, true: Response) -> FloatArray:
-        """Return what rounding of M, C, K at random changes in the outputs."""
-        terms, generator = sizes_of_terms(self.motion.R, s, true.x), np.random.default_rng(0)
-        forces = [EPS * terms * generator.uniform(-1.0, 1.0, terms.shape) for _ in range(TRIED_ROUNDINGS)]
-        changes = [np.abs(self.motion.seen(s, answer(force.astype(np.complex128)))) for force in forces]
-        return np.asarray(np.max(changes, axis=0))
 
 
 def lifted(stored: SparselyStored, motion: Solver, s: complex) -> Solver:

@@ -32,7 +32,7 @@ from halfdof_ctrl.reduction.method.loss import (
     loss_of,
     measured_loss,
 )
-from halfdof_ctrl.reduction.method.loss_bound import EVEN_STATES, is_well_conditioned
+from halfdof_ctrl.reduction.method.loss_bound import are_kept, is_well_conditioned
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
@@ -267,9 +267,7 @@ def _loses_nothing(found: SparseSolve) -> bool:
     except ModelSizeError:  # whoever asks for the outputs will hear of it
         return True
     x = scale[:, None] * np.linalg.solve(A, found.B / scale[:, None])
-    direct = output.direct(found.B.shape[1])
-    terms = (np.abs(output.X) @ np.abs(x) + np.abs(direct)).max(axis=0, initial=0.0)
-    return bool((terms <= EVEN_STATES * np.abs(direct - output.X @ x).max(axis=0, initial=0.0)).all())
+    return are_kept(output, x)
 
 
 def _singular_error(
