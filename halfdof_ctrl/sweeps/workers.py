@@ -17,6 +17,7 @@ from halfdof_ctrl.base.threads import available_cores, limited_threads
 from halfdof_ctrl.sweeps.waiting import CHUNK_SECONDS, SHORT_SECONDS, Chunk, Store, Waiting, Work
 
 USUAL_WORKERS = 32  #: of an executor that does not say how many it has
+LONGEST_WAIT = 1.0  #: [s] an interrupt that comes as a wait begins is heard at its end
 PIECES = 20  #: of even work that is done here and whose results are wanted as they come
 
 
@@ -133,7 +134,8 @@ class _Round:
                 except BrokenExecutor:
                     waiting.put_back(chunk)
                     return self.collect(wait(self.running).done, waiting)
-            lost = self.collect(wait(self.running, return_when=FIRST_COMPLETED).done, waiting)
+            back = wait(self.running, timeout=LONGEST_WAIT, return_when=FIRST_COMPLETED).done
+            lost = self.collect(back, waiting)
             if lost:
                 return lost + self.collect(wait(self.running).done, waiting)
         return []
