@@ -39,7 +39,7 @@ def eigenvalues_and_rounding(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     matrix = balanced(A)
     values, left, right = scipy.linalg.eig(matrix, left=True, right=True)  # type: ignore[misc]  # stubs lack this case
     cosine = np.abs(np.einsum("ij,ij->j", left.conj(), right))
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):  # vectors that are orthogonal but for a denormal number
         return values, np.minimum(ROUNDING_OF_A * np.linalg.norm(matrix, 2) / cosine, np.finfo(float).max)
 
 

@@ -35,3 +35,10 @@ def test_bound_holds_for_a_double_eigenvalue() -> None:
     assert_allclose(values, -1.0, rtol=0.0, atol=1e-7)
     assert (bounds > 1e-9).all()
     assert_allclose(eigenvalues_and_rounding(np.diag([1.0, -2.0]))[1], 0.0, rtol=0.0, atol=ROUNDOFF)
+
+
+def test_vectors_that_are_orthogonal_but_for_a_denormal_number_give_a_bound_without_a_warning() -> None:
+    """Two integrators of one fast signal: eigenvalues of which rounding leaves nothing."""
+    values, bounds = eigenvalues_and_rounding(np.array([[0.0, 0.0, 0.0], [-2e17, 0.0, 0.0], [-2e9, 0.0, 0.0]]))
+    assert not values.any()
+    assert (bounds > 0.0).all()
