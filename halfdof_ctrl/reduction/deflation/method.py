@@ -32,7 +32,7 @@ from halfdof_ctrl.reduction.deflation.realization import Realization, in_model_u
 from halfdof_ctrl.reduction.deflation.relaxation import BlockDecision, Relaxed, relaxed
 from halfdof_ctrl.reduction.deflation.row_system import Caution, RowSystem
 from halfdof_ctrl.reduction.deflation.states import StateSelection
-from halfdof_ctrl.reduction.method.doubted_singular import not_singular_error
+from halfdof_ctrl.reduction.method.doubted_singular import is_apart_from_singular, not_singular_error
 from halfdof_ctrl.reduction.method.evidence import ALLOWED_LOSS, Evidence, RankDecision
 from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.from_equations import FromEquations
@@ -171,7 +171,8 @@ def _proposals(model: SecondOrderModel, tol: float | None, decisions: list[Block
         decisions[:] = relaxation.decisions
         if relaxation.offsets is None:
             if not found_before and not barely and pencil.is_singular():
-                if exact_order(model) in {None, -1}:
+                exact = exact_order(model)
+                if exact == -1 or (exact is None and not is_apart_from_singular(pencil.P)):
                     raise _singular_error(model, pencil)
                 barely = True
             continue
@@ -190,7 +191,9 @@ def _realized(
     if isinstance(relaxation.system, ExactRows):
         result = solved_without_rounding(result, relaxation.system)
         certain = relaxation.system.exact
-    return result, certain or pencil.has_spectrum(result.equations.A)
+    q = result.equations.displacement
+    is_solved = all(np.isfinite(part).all() for part in (q.X, *q.U))
+    return result, is_solved and (certain or pencil.has_spectrum(result.equations.A))
 
 
 def _ways(system: RowSystem, *, exactly: bool) -> Iterator[tuple[RowSystem, Caution]]:

@@ -18,6 +18,7 @@ from halfdof_ctrl.reduction.method.proof import SINGULAR_AT_POINTS, scaled_penci
 MOST_INVERTED = 30  #: DOFs up to which P(s) is inverted in integers, in less than a second
 ROUNDED_ENTRIES = 2 * EPS  #: of the largest singular value: rounding of the entries of a singular P(s) left at most 0.8
 REAL_POINTS = (1, 3)  #: of s, in units in which it is near one
+SURELY_APART = 8 * EPS  #: times n: what rounding of coordinates makes of an entry is less by far, 0.8 eps as measured
 MOST_LOOKED_AT = 500  #: DOFs up to which a model that seems singular is looked at, in a second
 
 
@@ -49,7 +50,33 @@ def not_singular_error(model: SecondOrderModel, refusal: SingularPencilError) ->
     return UncertainRankError(msg, dofs=refusal.dofs, gap=max(1.0, size / (SINGULAR_AT_POINTS * n)))
 
 
-def change_to_singular(coefficients: FloatArray) -> float:
+def is_apart_from_singular(coefficients: FloatArray) -> bool:
+    """Tell whether P(s) is regular for certain, however nearly singular it is to working precision.
+
+    Each entry but exact zeros may change by the rounding of sums and products of as large ones as there are, as a
+    change of coordinates rounds them, 8 n eps. Two constraints that differ by 1e-10 are two, though a direct solve,
+    which squares that, takes them for one.
+
+    Parameters
+    ----------
+    coefficients : (3, n, n) ndarray
+        In units in which s and the largest entries are near one.
+
+    Examples
+    --------
+    >>> P = np.zeros((3, 3, 3))
+    >>> P[0] = [[1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [1.0, 1e-10, 0.0]]
+    >>> is_apart_from_singular(P), is_apart_from_singular(P @ np.diag([1.0, 1.0, 1e-10]))
+    (True, True)
+    """
+    n = coefficients.shape[1]
+    if n > MOST_INVERTED:
+        return False
+    largest = np.maximum(np.abs(coefficients).max(initial=0.0), 1.0)
+    return bool(change_to_singular(coefficients, np.where(coefficients != 0.0, largest, 0.0)) > SURELY_APART * n)
+
+
+def change_to_singular(coefficients: FloatArray, sizes: FloatArray | None = None) -> float:
     """Return the part of itself by which each entry of ``P_0 + P_1 s + P_2 s^2`` may change with P(s) still regular.
 
     That is one over the spectral radius of ``|P(s)^-1| (|P_0| + s |P_1| + s^2 |P_2|)`` (J. Rohn, 1989), the better of
@@ -59,6 +86,8 @@ def change_to_singular(coefficients: FloatArray) -> float:
     ----------
     coefficients : (3, n, n) ndarray
         In units in which s is near one.
+    sizes : (3, n, n) ndarray, optional
+        Of what entries change by a part; by default themselves.
 
     Examples
     --------
@@ -67,13 +96,14 @@ def change_to_singular(coefficients: FloatArray) -> float:
     >>> round(change_to_singular(P) * 2.0**42, 9)
     1.0
     """
-    integers, _ = as_integers(coefficients)
+    P, times = as_integers(coefficients)
+    size, by = as_integers(np.abs(coefficients) if sizes is None else sizes)
     best = 0.0
     for s in REAL_POINTS:
-        matrix, size = (part[0] + part[1] * s + part[2] * s**2 for part in (integers, abs(integers)))
+        matrix, size_at = (part[0] + part[1] * s + part[2] * s**2 for part in (P, size))
         try:
             inverse, factor = solved_exactly(matrix, as_integers(np.eye(len(matrix)))[0])
-            product = as_floats(abs(inverse) @ size, abs(factor))
+            product = as_floats((abs(inverse) @ size_at) << times, abs(factor) << by)
         except (np.linalg.LinAlgError, OverflowError):
             continue
         best = max(best, 1.0 / float(np.abs(np.linalg.eigvals(product)).max(initial=EPS)))

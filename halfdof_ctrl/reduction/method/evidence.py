@@ -148,10 +148,10 @@ def _warn_of_hardly_regular(rcond: float) -> None:
 
 def _warn_of_barely_regular() -> None:
     msg = (
-        "det P(s) vanishes at every s to working precision: only parts of M, C, K that rounding could have made, had "
-        "their entries been rounded, give the equations one solution. They are taken as they are stored, for they have "
-        "few digits. Look for entries that nearly cancel: mend them if they should, or give the DOFs the mass, damper "
-        "or spring that is meant."
+        "det P(s) vanishes at every s to working precision: only a part of M, C, K that is left where entries nearly "
+        "cancel gives the equations one solution. It is more than rounding of the entries explains, and is taken as it "
+        "is stored. Look for constraints that are nearly the same and other entries that nearly cancel: mend them if "
+        "they should, or give the DOFs the mass, damper or spring that is meant."
     )
     give_warning(msg, CloseDecisionWarning)
 

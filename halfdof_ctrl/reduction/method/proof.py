@@ -11,6 +11,7 @@ against a direct solve at such points is measured as well.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,7 @@ RATIO_DRIFT = 0.01  #: change of the logarithm of the ratio in (19) that roundin
 DRIFT_AMONG_POLES = 0.1  #: the same at points among the eigenvalues of A, which a loss that is told moves
 AMONG_EIGENVALUES = (0.25, 0.75)  #: quantiles of their sizes at which such points are
 NO_EIGENVALUE = 181  #: times a power of two: numbers of which no simple model has one as its eigenvalue
+NEAR_EXACTLY = ((NO_EIGENVALUE, -9), (NO_EIGENVALUE, -7), (NO_EIGENVALUE, -5))  #: points at which integers give P(s)
 STANDING = 1e-3  #: of the typical frequency and of the largest eigenvalue: smaller ones may stand for multiple zeros
 SINGULAR_AT_POINTS = 64 * EPS  #: times n: P(s) is singular below this ratio of singular values
 AXIS_POINTS = (0.29j, 1.03j, 3.71j)  #: points for the loss of digits, in units of the time scale
@@ -70,14 +72,16 @@ class ScaledPencil:
             return False
         sizes = np.abs(np.linalg.eigvals(A))
         beyond = 1 + math.frexp(max(float(sizes.max(initial=0.0)), 1.0))[1]
-        short = [(1, beyond), (1, beyond + 1), *self._among(sizes)]  # at which P(s) can be formed exactly
-        points = [*NEAR_POINTS, *(factor * 2.0**power for factor, power in short)]
-        unit = np.eye(len(A))
-        of_A = np.array([np.linalg.slogdet(s * unit - A)[1] for s in points])
+        far = [(1, beyond), (1, beyond + 1), *self._among(sizes)]
+        points = [*NEAR_POINTS, *(factor * 2.0**power for factor, power in far)]
         of_P = np.array([self._log_determinant(s) for s in points])
-        if not _is_constant(of_P - of_A) and len(unit) and self.P.shape[1] <= LARGEST_EXACT:
-            of_P[len(NEAR_POINTS) :] = self._exact_log_determinants(short)
-        return _is_constant(of_P - of_A)
+        if _is_constant(of_P - _log_characteristics(A, points)):
+            return True
+        if self.P.shape[1] > LARGEST_EXACT:
+            return False
+        short = [*NEAR_EXACTLY, *far]
+        of_A = _log_characteristics(A, [factor * 2.0**power for factor, power in short])
+        return _is_constant(self._exact_log_determinants(short) - of_A)
 
     def _among(self, sizes: FloatArray) -> list[tuple[int, int]]:
         """Return points among the eigenvalues of A, a factor and a power of two, of models that integers can judge.
@@ -166,6 +170,11 @@ class ScaledPencil:
     def _smallest(self, s: complex) -> float:
         values = np.linalg.svd(self._scaled(s), compute_uv=False)
         return float(values[-1] / values[0]) if values[0] > 0.0 else 0.0
+
+
+def _log_characteristics(A: FloatArray, points: Sequence[complex]) -> FloatArray:
+    """Return logarithms of the size of ``det(s I - A)``."""
+    return np.array([np.linalg.slogdet(s * np.eye(len(A)) - A)[1] for s in points])
 
 
 def _is_constant(ratios: FloatArray) -> bool:
