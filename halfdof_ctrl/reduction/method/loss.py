@@ -60,6 +60,8 @@ MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
 STEEP = 2.5  #: power of s beyond which a channel falls steeply, towards either end: there, ...
 ENVELOPE_POWER = 3.0  #: ... a loss is measured by what it would be if it fell by this power ...
 APART = 5.0  #: ... from frequencies that are so many times lower or higher
+NEAR_REST = 1e-5  #: part that is left of a velocity there: rounding of displacements leaves ten digits of it
+STEEP_RISE = 4.0  #: power of s of what is no input or output of a kind
 STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 SAME_UNITS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
@@ -168,7 +170,9 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
     gentle = _is_gentle(np.abs(at), value)
     size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, _slopes_from(np.abs(at), value)))
-    missed = np.where(_stays(np.abs(at), value, measurement.slow), missed, 0.0)
+    missed = np.where(
+        _stays(np.abs(at), value, measurement.slow, _kinds(measurement.model, measurement.chosen)), missed, 0.0
+    )
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
         return NOTHING_LOST
@@ -201,17 +205,32 @@ def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
     return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
 
 
-def _stays(omega: FloatArray, value: FloatArray, slow: Slow) -> npt.NDArray[np.bool_]:
+def _stays(omega: FloatArray, value: FloatArray, slow: Slow, kinds: FloatArray) -> npt.NDArray[np.bool_]:
     """Return which channels are looked at: below all that moves, those that change gently, and at rest, hardly at all.
 
-    Others fall or rise without end there.
+    Others fall or rise without end there, but for velocities and inputs that are derivatives (`kinds` of channels, (p,
+    k), powers of s), which are looked at down to where rounding of displacements leaves ten digits of them.
     """
     at_rest = (omega < slow.least)[:, None, None]
-    changes = _changes(value)
     stays = _is_gentle(omega, value) & ~at_rest
-    stays[:-1] |= at_rest[:-1] & (changes < STAYS)
+    seen = (omega[:-1, None, None] / slow.least) ** kinds > NEAR_REST if slow.least > 0.0 else np.zeros((1, 1, 1))
+    rates = np.where(seen, kinds, 0.0)
+    stays[:-1] |= at_rest[:-1] & (_changes(value) < STAYS * (omega[1:] / omega[:-1])[:, None, None] ** rates)
     stays[omega >= slow.typical] = True
     return stays
+
+
+def _kinds(model: SecondOrderModel, chosen: IndexArray) -> FloatArray:
+    """Return by which power of s channels fall towards rest at least, by their signals: 1 for a velocity."""
+    inputs, outputs = model.quadratics.B, model.quadratics.F
+    into = np.min([_power(k, as_dense(part)[:, chosen].any(axis=0)) for k, part in enumerate(inputs)], axis=0)
+    seen = np.min([_power(k, as_dense(part).any(axis=1)) for k, part in enumerate(outputs)], axis=0)
+    direct = np.min([_power(k, as_dense(part)[:, chosen] != 0.0) for k, part in enumerate(model.quadratics.D)], axis=0)
+    return np.asarray(np.minimum(seen[:, None] + into, direct))
+
+
+def _power(k: int, there: npt.NDArray[np.bool_]) -> FloatArray:
+    return np.where(there, float(k), STEEP_RISE)
 
 
 def _is_gentle(omega: FloatArray, value: FloatArray) -> npt.NDArray[np.bool_]:

@@ -122,6 +122,8 @@ def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[floa
     if at_origin:
         others = next(part for part in (sizes[at_origin:], corners, own) if part.size)
         least = min(_end_of_drift(sizes[:at_origin]), TOWARDS_FREE * float(others.min()))
+        if exactly:  # typical frequencies are no rounding of free motions: they are looked at whatever drifts there
+            least = min(least, TYPICAL_SPEEDS[0] * min(speeds))
         chosen = np.append(chosen[chosen > least], max(least, TOWARDS_FREE * chosen[0]))
         chosen.sort()
     still = at_origin > 0 or float(sizes.min(initial=np.inf)) < NEAR_ORIGIN * chosen[0]
