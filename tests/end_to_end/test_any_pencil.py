@@ -216,13 +216,14 @@ ILL_CONDITIONED = (  # M is regular, but nearly singular in some direction acros
 
 @pytest.mark.parametrize(("kind", "size", "seed"), ILL_CONDITIONED)
 def test_directions_of_little_mass_get_coordinates_of_their_own(kind: Kind, size: int, seed: int) -> None:
-    """States that are DOFs lose up to six digits of H(s) there, the default ones 6e-9 of a small channel at most."""
+    """States that are DOFs lose up to six digits of H(s) there, or are none; the default ones say what they lose."""
     generator = np.random.default_rng([seed, size])
     model = signals(generator, kind(generator, size))
     exact, (reduction, _) = rational_transfer(model), reduced_aloud(model)
     assert reduction.method == "orthogonal"
-    assert reduction.solution.evidence.loss.value < 1e-8
-    assert errors(complete(reduction), exact).max() <= 1e-9
+    told = reduction.solution.evidence.loss.value
+    assert told < 1e-6
+    assert errors(complete(reduction), exact).max() <= max(1e-9, 10.0 * told)
 
 
 def test_asking_for_a_method_keeps_its_coordinates() -> None:

@@ -56,6 +56,12 @@ class Improved:
             values = [self._exactly(complex(s)) for s in np.atleast_1d(np.asarray(points))]
         return np.stack(values, axis=2)
 
+    def terms_at(self, points: npt.ArrayLike) -> FloatArray:
+        """Evaluate the sizes of what is summed, ``|C| |(sI - A)^-1 B| + |D|``: (p, m, k)."""
+        unit, C, D = np.eye(len(self.A)), np.abs(self.C), np.abs(self.D)
+        values = [C @ np.abs(np.linalg.solve(s * unit - self.A, self.B)) + D for s in np.atleast_1d(np.asarray(points))]
+        return np.stack(values, axis=2)
+
     def _exactly(self, s: complex) -> ComplexArray:
         point = flint.acb(s.real, s.imag)
         value = _ball_matrix(self.D)
@@ -94,7 +100,9 @@ def polynomial_at(parts: tuple[FloatArray, ...], points: npt.ArrayLike, shape: t
     return value
 
 
-def transfer_errors(actual: ComplexArray, desired: ComplexArray, also: ComplexArray | None = None) -> FloatArray:
+def transfer_errors(
+    actual: ComplexArray, desired: ComplexArray, also: ComplexArray | FloatArray | None = None
+) -> FloatArray:
     """Give at each of k points the largest error of (p, m, k) responses over the largest entry there.
 
     Where H is a sum of which a part, `also`, is larger than itself, the error is taken over the largest of that part.
