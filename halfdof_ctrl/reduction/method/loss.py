@@ -11,7 +11,6 @@ smaller than the rounding of any of them; of P(s)^-1 r the first digit counts. D
 docs/explanation/evaluation.md.
 """
 
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
@@ -34,6 +33,15 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.integers import has_short_entries
 from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
+from halfdof_ctrl.reduction.method.channels import (
+    columns_of,
+    is_gentle,
+    is_looked_at,
+    least_powers,
+    rounding_of_channels,
+    rounding_of_zeros,
+    slopes_from,
+)
 from halfdof_ctrl.reduction.method.long_answers import long_responses
 from halfdof_ctrl.reduction.method.loss_points import (
     NOTHING_SLOW,
@@ -57,12 +65,6 @@ from halfdof_ctrl.reduction.method.refined_answers import (
 from halfdof_ctrl.reduction.method.signals import Signal
 
 MOST_INPUTS = 8  #: columns of B for which it is measured, spread over all
-STEEP = 2.5  #: power of s beyond which a channel falls steeply, towards either end: there, ...
-ENVELOPE_POWER = 3.0  #: ... a loss is measured by what it would be if it fell by this power ...
-APART = 5.0  #: ... from frequencies that are so many times lower or higher
-NEAR_REST = 1e-5  #: part that is left of a velocity there: rounding of displacements leaves ten digits of it
-STEEP_RISE = 4.0  #: power of s of what is no input or output of a kind
-STAYS = 2.0  #: ratio of the values of a channel at neighbouring frequencies that are about the same
 SAME_UNITS = 100.0  #: ratio of frequencies at which unknowns are measured in the same units
 TEN_TIMES_DATA = 100.0  #: times what rounding of M, C, K at random changes, which is a tenth of (DATA) or less
 UNSETTLED = 10.0  #: times what two responses are known to: a smaller difference is none
@@ -70,8 +72,6 @@ UNCLEAR = 1e-10  #: of a value, or ...
 UNCLEAR_CHANNEL = 1e-22  #: ... of what a channel could be: responses known to no more are worked in hundreds of bits
 LONG_ZERO = 1e-60  #: of what a channel could be: less is nothing in hundreds of bits
 UNDETERMINED_VALUE = 1e-2  #: of a value, that rounding of M, C and K changes: nothing is looked for where it is more
-ZERO_CHANNEL = 100.0  #: times what these change in it, or rounding: a smaller channel is zero
-SMALL_CHANNEL = 1e-6  #: of the largest motion, scaled: only a smaller channel can be zero but for rounding of M, C, K
 ASKED_STATES = 120  #: states of which it is asked whether they are even; of more, that takes as long as the reduction
 SPREAD = 4.0  #: between singular values of a block of M or C, from which on it is mixed if DOFs lose digits ...
 SAVED = 0.1  #: ... and the loss is then this part of what it was, or less
@@ -167,12 +167,11 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     )
     own = np.maximum(value, grown)
     missed, value = np.where(missed > allowed * moved, missed, 0.0), np.where(value > rounding, value, 0.0)
-    value = np.where((value > _rounding_of_zeros(value)).any(axis=0), value, 0.0)
-    gentle = _is_gentle(np.abs(at), value)
-    size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, _slopes_from(np.abs(at), value)))
-    missed = np.where(
-        _stays(np.abs(at), value, measurement.slow, _kinds(measurement.model, measurement.chosen)), missed, 0.0
-    )
+    value = np.where((value > rounding_of_zeros(value)).any(axis=0), value, 0.0)
+    gentle = is_gentle(np.abs(at), value)
+    size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, slopes_from(np.abs(at), value)))
+    kinds = least_powers(measurement.model, measurement.chosen)
+    missed = np.where(is_looked_at(np.abs(at), value, measurement.slow, kinds), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
     if not relative.size:
         return NOTHING_LOST
@@ -198,74 +197,9 @@ def _neighbours(points: ComplexArray) -> list[ComplexArray]:
     return groups
 
 
-def _slopes_from(omega: FloatArray, value: FloatArray) -> FloatArray:
-    """Return what channels would be at each point if they fell no more steeply than by s^3 from any other point."""
-    ratio = np.maximum(omega, omega[:, None]) / np.minimum(omega, omega[:, None])
-    shares = np.where(ratio >= APART, ratio**-ENVELOPE_POWER, 0.0)
-    return np.asarray((shares[:, :, None, None] * value).max(axis=1, initial=0.0))
-
-
-def _stays(omega: FloatArray, value: FloatArray, slow: Slow, kinds: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return which channels are looked at: below all that moves, those that change gently, and at rest, hardly at all.
-
-    Others fall or rise without end there, but for velocities and inputs that are derivatives (`kinds` of channels, (p,
-    k), powers of s), which are looked at down to where rounding of displacements leaves ten digits of them.
-    """
-    at_rest = (omega < slow.least)[:, None, None]
-    stays = _is_gentle(omega, value) & ~at_rest
-    seen = (omega[:-1, None, None] / slow.least) ** kinds > NEAR_REST if slow.least > 0.0 else np.zeros((1, 1, 1))
-    rates = np.where(seen, kinds, 0.0)
-    stays[:-1] |= at_rest[:-1] & (_changes(value) < STAYS * (omega[1:] / omega[:-1])[:, None, None] ** rates)
-    stays[omega >= slow.typical] = True
-    return stays
-
-
-def _kinds(model: SecondOrderModel, chosen: IndexArray) -> FloatArray:
-    """Return by which power of s channels fall towards rest at least, by their signals: 1 for a velocity."""
-    inputs, outputs = model.quadratics.B, model.quadratics.F
-    into = np.min([_power(k, as_dense(part)[:, chosen].any(axis=0)) for k, part in enumerate(inputs)], axis=0)
-    seen = np.min([_power(k, as_dense(part).any(axis=1)) for k, part in enumerate(outputs)], axis=0)
-    direct = np.min([_power(k, as_dense(part)[:, chosen] != 0.0) for k, part in enumerate(model.quadratics.D)], axis=0)
-    return np.asarray(np.minimum(seen[:, None] + into, direct))
-
-
-def _power(k: int, there: npt.NDArray[np.bool_]) -> FloatArray:
-    return np.where(there, float(k), STEEP_RISE)
-
-
-def _is_gentle(omega: FloatArray, value: FloatArray) -> npt.NDArray[np.bool_]:
-    """Return where channels change, to the point below or above, by no power of s that is steep."""
-    gently = _changes(value) < STAYS * ((omega[1:] / omega[:-1]) ** STEEP)[:, None, None]
-    gentle = np.zeros(value.shape, dtype=np.bool_)
-    gentle[:-1] |= gently
-    gentle[1:] |= gently
-    return gentle
-
-
-def _changes(value: FloatArray) -> FloatArray:
-    """Return the ratios of neighbouring values, the larger over the smaller."""
-    ratio = np.divide(value[:-1], value[1:], out=np.zeros_like(value[1:]), where=value[1:] > 0.0)
-    return np.asarray(np.maximum(ratio, 1.0 / np.maximum(ratio, sys.float_info.min)))
-
-
 def looked_at(count: int, most: int) -> IndexArray:
     """Choose some of many, spread over all."""
     return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
-
-
-def rounding_of_channels(true: Response, moved: FloatArray) -> FloatArray:
-    """Return below which size values are zero: by sums, and of a small channel, by rounding of M, C, K."""
-    rounding, value = ZERO_CHANNEL * true.rounding, np.abs(true.y)
-    small, most = SMALL_CHANNEL * true.shown, ZERO_CHANNEL * moved
-    is_zero = (value <= np.minimum(small, most)) & (most <= small)
-    return np.asarray(np.where(is_zero, np.maximum(rounding, most), rounding))
-
-
-def _rounding_of_zeros(value: FloatArray) -> FloatArray:
-    """Return below which size a channel is zero but for rounding at each point, in units of rows and columns."""
-    rows = value.max(axis=2, keepdims=True)
-    across = np.divide(value, rows, out=np.zeros_like(value), where=rows > 0.0).max(axis=1, keepdims=True)
-    return np.asarray(ZERO_CHANNEL * EPS * rows * across)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -290,13 +224,13 @@ class _Comparison:
         points = points[np.argsort(np.abs(points))]
         speed = typical_speeds(model)[-1] if few else float(np.median(np.abs(points))) if N else 1.0
         rows, columns = scaling = max_scaling(sizes_at(model.quadratics.P, speed), even=2.0)
-        B = [rows[:, None] * part for part in _columns(model.quadratics.B, chosen)]
+        B = [rows[:, None] * part for part in columns_of(model.quadratics.B, chosen)]
         inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
         motion = Equations(
             R=[_scaled(part, rows, columns) for part in model.quadratics.P],
             B=[part * inputs for part in B],
             C=[_scaled(part, np.ones(part.shape[0]), columns) for part in model.quadratics.F],
-            D=[part * inputs for part in _columns(model.quadratics.D, chosen)],
+            D=[part * inputs for part in columns_of(model.quadratics.D, chosen)],
         )
         (A, scale), output = balanced_states(stored.A), stored.output(model)
         into = stored.B[:, chosen] * inputs / scale[:, None]
@@ -388,11 +322,6 @@ def _speeds_of_signals(motion: Equations) -> list[float]:
     return [
         speed for parts in (motion.B, motion.C, motion.D) for speed in signal_speeds([as_dense(part) for part in parts])
     ]
-
-
-def _columns(coefficients: Sequence[Matrix], chosen: IndexArray) -> list[FloatArray]:
-    """Return columns of a polynomial's coefficients, dense."""
-    return [np.asarray(as_dense(part[:, chosen])) for part in coefficients]
 
 
 def _scaled(matrix: Matrix, rows: FloatArray, columns: FloatArray) -> Matrix:

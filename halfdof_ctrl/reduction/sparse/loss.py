@@ -25,16 +25,14 @@ from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.algebra.sparse_lu import is_nearly_symmetric
+from halfdof_ctrl.reduction.method.channels import SMALL_CHANNEL, ZERO_CHANNEL, rounding_of_channels
 from halfdof_ctrl.reduction.method.loss import (
     MOST_INPUTS,
-    SMALL_CHANNEL,
     UNSETTLED,
-    ZERO_CHANNEL,
     Measured,
     Measurement,
     Stored,
     looked_at,
-    rounding_of_channels,
 )
 from halfdof_ctrl.reduction.method.loss_points import (
     ALL_EIGENVALUES,
