@@ -51,6 +51,13 @@ class SlicedMatrix:
         (first, second, rest), bits = _cut(array, scale, array.shape[1])
         return cls(first, second, rest, bits, not (second.any() or rest.any()))
 
+    def leading(self) -> Any:  # noqa: ANN401  # a matrix of the kind that is cut
+        """Return the matrix but for its rest."""
+        if is_sparse(self.first):
+            place = (self.first.indices, self.first.indptr)
+            return csc_array((self.first.data + self.second.data, *place), shape=self.first.shape)
+        return self.first + self.second
+
     def times(self, x: FloatArray) -> list[FloatArray]:
         """Return parts whose sum is the product with an (n, k) array: three exact ones and one that is small."""
         scale = powers_of_two(np.abs(x).max(axis=0, initial=0.0))
@@ -65,14 +72,16 @@ class ExactPolynomial:
     """``R_0 + R_1 s + R_2 s^2`` with coefficients cut for exact products."""
 
     def __init__(self, coefficients: Sequence[Matrix]) -> None:
+        self.rows = coefficients[0].shape[0]
         self.parts: list[tuple[int, complex, SlicedMatrix]] = []
         for power, coefficient in enumerate(coefficients):
             matrix: Any = coefficient
             values: Any = as_sparse(matrix) if is_sparse(matrix) else np.asarray(matrix)
-            if np.iscomplexobj(values.data if is_sparse(matrix) else values):
-                self.parts += [(power, 1.0, SlicedMatrix.of(values.real)), (power, 1j, SlicedMatrix.of(values.imag))]
-            else:
-                self.parts.append((power, 1.0, SlicedMatrix.of(values)))
+            for unit, part in ((1.0, values.real), (1j, values.imag)) if _is_complex(values) else ((1.0, values),):
+                if (part.data if is_sparse(part) else part).any():
+                    self.parts.append((power, unit, SlicedMatrix.of(part)))
+        #: leading bits of those that act on what has errors, on s x and s^2 x
+        self.leading = [matrix.leading() if power else None for power, _, matrix in self.parts]
 
     def residual(self, s: complex | ComplexArray, x: ComplexArray, right: ComplexArray | float = 0.0) -> ComplexArray:
         """Return ``right - P(s) x``, summed in twice the working precision and rounded once.
@@ -95,60 +104,58 @@ class ExactPolynomial:
         >>> polynomial.residual(1.0, np.array([[1.0 + 0j]]), np.array([[1.0 + 0j]])).real.tolist()
         [[-1e-20]]
         """
-        rows = self.parts[0][2].first.shape[0]
-        total = _Sum(np.broadcast_to(np.asarray(right, dtype=np.complex128), (rows, x.shape[1])))
+        columns = x.shape[1]
+        total = _Sum(_side_by_side(np.broadcast_to(np.asarray(right, dtype=np.complex128), (self.rows, columns))))
         points = np.broadcast_to(np.asarray(s, dtype=np.complex128), x.shape[1:])
-        powers = [_Complex.of(x)]
-        for power, unit, matrix in self.parts:
+        first = _side_by_side(x)
+        powers: list[Pair] = [(first, np.zeros_like(first))]
+        for (power, unit, matrix), leading in zip(self.parts, self.leading, strict=True):
             while len(powers) <= power:
-                powers.append(powers[-1].times(points))
-            vector = powers[power]
-            columns = x.shape[1]
-            both = np.hstack([vector.real[0], vector.imag[0]])
-            parts = matrix.times(both)
-            if power:  # x itself has no errors
-                parts.append((matrix.first + matrix.second) @ np.hstack([vector.real[1], vector.imag[1]]))
+                powers.append(_times(powers[-1], points))
+            vector, errors = powers[power]
+            parts = matrix.times(vector)
+            if leading is not None:
+                parts.append(leading @ errors)
             for part in parts:
-                value = part[:, :columns] + 1j * part[:, columns:]
-                total.subtract(value if unit == 1.0 else 1j * value)
-        return total.value()
+                total.subtract(part if unit == 1.0 else _turned(part))
+        value = total.value()
+        return np.asarray(value[:, :columns] + 1j * value[:, columns:])
+
+
+def _is_complex(values: Any) -> bool:  # noqa: ANN401  # dense or sparse
+    return np.iscomplexobj(values.data if is_sparse(values) else values)
+
+
+def _side_by_side(x: ComplexArray) -> FloatArray:
+    """Return real and imaginary parts side by side."""
+    return np.hstack([x.real, x.imag])
+
+
+def _turned(parts: FloatArray) -> FloatArray:
+    """Return real and imaginary parts, side by side, times i."""
+    columns = parts.shape[1] // 2
+    return np.hstack([-parts[:, columns:], parts[:, :columns]])
+
+
+def _times(vector: Pair, s: ComplexArray) -> Pair:
+    """Return complex numbers with errors, real and imaginary parts side by side, each column times its point."""
+    turned = (_turned(vector[0]), _turned(vector[1]))
+    return _added(_scaled(vector, np.tile(s.real, 2)), _scaled(turned, np.tile(s.imag, 2)))
 
 
 class _Sum:
-    """Complex sums of doubles with their errors."""
+    """Sums of doubles with their errors."""
 
-    def __init__(self, start: ComplexArray) -> None:
-        self.high = start.copy()
+    def __init__(self, start: FloatArray) -> None:
+        self.high = start
         self.low = np.zeros_like(start)
 
-    def subtract(self, value: ComplexArray) -> None:
-        real, real_error = two_sum(self.high.real, -value.real)
-        imag, imag_error = two_sum(self.high.imag, -value.imag)
-        self.high = real + 1j * imag
-        self.low += real_error + 1j * imag_error
+    def subtract(self, value: FloatArray) -> None:
+        self.high, error = two_sum(self.high, -value)
+        self.low += error
 
-    def value(self) -> ComplexArray:
+    def value(self) -> FloatArray:
         return np.asarray(self.high + self.low)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Complex:
-    """Complex numbers whose parts are doubles with errors."""
-
-    real: Pair
-    imag: Pair
-
-    @classmethod
-    def of(cls, x: ComplexArray) -> "_Complex":
-        none = np.zeros(x.shape)
-        return cls((x.real.copy(), none), (x.imag.copy(), none))
-
-    def times(self, s: ComplexArray) -> "_Complex":
-        real, imag = s.real, s.imag
-        return _Complex(
-            _added(_scaled(self.real, real), _scaled(self.imag, -imag)),
-            _added(_scaled(self.real, imag), _scaled(self.imag, real)),
-        )
 
 
 def as_it_is(matrix: FloatArray) -> Matrix:
@@ -167,13 +174,18 @@ def two_sum(a: FloatArray, b: FloatArray) -> Pair:
 def two_product(a: FloatArray, b: FloatArray) -> Pair:
     """Return the rounded product and its error, for numbers whose product neither overflows nor vanishes."""
     value = a * b
-    a_high, b_high = (SPLITTER * x - (SPLITTER * x - x) for x in (a, b))
-    a_low, b_low = a - a_high, b - b_high
+    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
     return value, ((a_high * b_high - value) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
+def _halves(a: FloatArray) -> Pair:
+    scaled = SPLITTER * a
+    high = scaled - (scaled - a)
+    return high, a - high
+
+
 def _scaled(pair: Pair, factor: FloatArray) -> Pair:
-    high, error = two_product(pair[0], np.broadcast_to(factor, pair[0].shape))
+    high, error = two_product(pair[0], factor)
     return high, error + pair[1] * factor
 
 

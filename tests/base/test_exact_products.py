@@ -1,5 +1,6 @@
 """Residuals in twice the working precision against rational arithmetic."""
 
+from collections.abc import Callable
 from fractions import Fraction
 
 import numpy as np
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.base.exact_products import ExactPolynomial, two_product, two_sum
 
 LAST_DIGIT = 2.0**-52  #: of the residual itself, which is rounded once
@@ -74,3 +76,16 @@ def test_residual_does_not_depend_on_the_order_of_the_unknowns() -> None:
     plain = ExactPolynomial(matrices).residual(0.3j, x)
     turned = ExactPolynomial([matrix[:, order] for matrix in matrices]).residual(0.3j, x[order])
     assert_array_equal(turned, plain)
+
+
+@pytest.mark.parametrize("kind", [np.asarray, csc_array])
+def test_coefficients_of_zeros_take_nothing_away(kind: Callable[[np.ndarray], Matrix]) -> None:
+    """A polynomial without entries leaves the right-hand side, in as many rows as it has."""
+    none, x = kind(np.zeros((3, 2))), np.ones((2, 4), dtype=np.complex128)
+    right = np.arange(12.0).reshape(3, 4).astype(np.complex128)
+    assert_array_equal(ExactPolynomial([none, none, none]).residual(2j, x, right), right)
+    entries = kind(np.eye(3, 2) * (1.0 + 2.0j))
+    assert_array_equal(
+        ExactPolynomial([none, none, entries]).residual(2j, x, right),
+        right + np.array([[4.0 + 8.0j], [4.0 + 8.0j], [0.0]]),
+    )

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from halfdof_ctrl.base.matrix_residual import exact_product, exact_residual
+from halfdof_ctrl.base.matrix_residual import COLUMNS_TOGETHER, exact_product, exact_residual
 
 BEYOND = 2.0**-85  #: of the largest terms: what is left of twice the working precision
 
@@ -35,3 +35,12 @@ def test_empty_factors_give_zeros() -> None:
     """A product over no terms is zero, so that the residual is the target."""
     assert_array_equal(exact_product(np.zeros((2, 0)), np.zeros((0, 3))), np.zeros((2, 3)))
     assert_array_equal(exact_residual(np.ones((2, 3)), np.zeros((2, 0)), np.zeros((0, 3))), np.ones((2, 3)))
+
+
+def test_many_columns_are_worked_as_each_of_them_is() -> None:
+    """A sparse factor multiplies a few columns at a time, to the last bit as it does single ones."""
+    generator = np.random.default_rng(0)
+    left = np.diag(generator.standard_normal(60)) + np.diag(generator.standard_normal(59), 1)
+    right, target = generator.standard_normal((2, 60, 2 * COLUMNS_TOGETHER + 3))
+    single = [exact_residual(target[:, [j]], left, right[:, [j]]) for j in range(right.shape[1])]
+    assert_array_equal(exact_residual(target, left, right), np.hstack(single))
