@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any, TypeAlias
+from weakref import WeakValueDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -33,7 +34,7 @@ SMALLEST_NORMAL = float(np.finfo(float).tiny)  #: below it numbers have fewer di
 EVEN_ENTRIES = 1e5  #: ratio of the largest to the smallest entry of a matrix up to which they are of similar sizes
 FEW_COMPARED = 400  #: of a matrix, up to which they are compared as plain numbers, which takes a microsecond
 LARGEST_EXPONENT = 1023  #: of a power of two
-SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once
+SHARED_SIZE = 1024  #: constant matrices up to this many entries are made once, larger ones as long as one is in use
 
 
 def checked_matrix(value: object, letter: str, shape: tuple[int, int] | None = None) -> DenseMatrix:
@@ -248,13 +249,26 @@ def shape_of(value: Any) -> tuple[int, ...]:  # noqa: ANN401  # whatever the use
 
 
 def zero_matrix(rows: int, columns: int) -> FloatArray:
-    """Return a read-only matrix of zeros; small ones are shared."""
-    return _small_zeros(rows, columns) if rows * columns <= SHARED_SIZE else read_only(np.zeros((rows, columns)))
+    """Return a read-only matrix of zeros; those of one shape are shared."""
+    if rows * columns <= SHARED_SIZE:
+        return _small_zeros(rows, columns)
+    shape = rows, columns
+    found = _large_zeros.get(shape)
+    return _large_zeros.setdefault(shape, read_only(np.zeros(shape))) if found is None else found
 
 
 def unit_matrix(size: int) -> FloatArray:
-    """Return a read-only identity matrix; small ones are shared."""
-    return _small_unit(size) if size * size <= SHARED_SIZE else read_only(np.eye(size))
+    """Return a read-only identity matrix; those of one size are shared."""
+    if size * size <= SHARED_SIZE:
+        return _small_unit(size)
+    found = _large_units.get(size)
+    return _large_units.setdefault(size, read_only(np.eye(size))) if found is None else found
+
+
+def is_unit(matrix: Matrix) -> bool:
+    """Return whether a matrix is an identity matrix that `unit_matrix` shares, without looking at its entries."""
+    n = matrix.shape[0]
+    return matrix is (_small_unit(n) if n * n <= SHARED_SIZE else _large_units.get(n))
 
 
 def powers_of_two(size: FloatArray) -> FloatArray:
@@ -292,8 +306,8 @@ def is_zero(matrix: Matrix, *others: Matrix) -> bool:
             return False
     if type(matrix) is not np.ndarray and issparse(matrix):
         return bool(matrix.size == 0)  # of stored entries, none of which is zero
-    shared = matrix.size <= SHARED_SIZE and matrix is _small_zeros(*matrix.shape)
-    return shared or not matrix.any()
+    shared = _small_zeros(*matrix.shape) if matrix.size <= SHARED_SIZE else _large_zeros.get(matrix.shape)
+    return matrix is shared or not matrix.any()
 
 
 def _numbers(value: object, letter: str) -> DenseMatrix:
@@ -368,6 +382,10 @@ def read_only(array: DenseMatrix) -> DenseMatrix:
     """Lock an array of our own against writing and give it back."""
     array.setflags(write=False)
     return array
+
+
+_large_zeros: WeakValueDictionary[tuple[int, int], FloatArray] = WeakValueDictionary()
+_large_units: WeakValueDictionary[int, FloatArray] = WeakValueDictionary()
 
 
 @lru_cache(maxsize=256)

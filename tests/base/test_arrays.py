@@ -1,5 +1,9 @@
 """The one door for matrices: what it takes, what it refuses and with which words."""
 
+import gc
+import weakref
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 import scipy.sparse
@@ -13,6 +17,8 @@ from halfdof_ctrl.base.arrays import (
     as_dense,
     checked_matrix,
     is_complex,
+    is_unit,
+    is_zero,
     read_only,
     unit_matrix,
     zero_matrix,
@@ -149,6 +155,27 @@ def test_constant_matrices_are_read_only(size: int) -> None:
             array[0, 0] = 5.0
     assert_array_equal(unit_matrix(size), np.eye(size))
     assert_array_equal(zero_matrix(size, 2), np.zeros((size, 2)))
+
+
+@pytest.mark.parametrize("size", [2, 40])
+def test_constant_matrices_are_shared_and_known_at_once(size: int) -> None:
+    """Who asks for the same zeros or units gets the same array; others of equal entries are looked at."""
+    zeros, unit = zero_matrix(size, size), unit_matrix(size)
+    assert zero_matrix(size, size) is zeros
+    assert unit_matrix(size) is unit
+    assert is_unit(unit)
+    assert not is_unit(np.eye(size))
+    assert is_zero(zeros, np.zeros((size, 3)))
+    assert not is_zero(unit)
+    assert not is_unit(np.ones((size, size + 1)))
+
+
+@pytest.mark.parametrize("make", [unit_matrix, lambda size: zero_matrix(size, size + 1)])
+def test_large_constant_matrices_are_kept_as_long_as_they_are_used(make: Callable[[int], np.ndarray]) -> None:
+    """Sharing holds no memory that nobody needs."""
+    watched = weakref.ref(make(211))
+    gc.collect()
+    assert watched() is None
 
 
 def test_locked_array_is_the_same_array() -> None:

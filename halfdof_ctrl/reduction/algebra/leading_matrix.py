@@ -129,10 +129,13 @@ class LeadingMatrix:
             size = size / self.rows[:, None] / self.columns
         return size
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled and its condition asks for it."""
+    def solve(self, right: FloatArray, *, overwrite: bool = False) -> FloatArray:
+        """Return ``W^-1 right`` for an (n, k) array, refined once where W was scaled and its condition asks for it.
+
+        With `overwrite` the result may take the place of `right`, which a large array that nobody else needs allows.
+        """
         if self.scaled is None:
-            return np.asarray(dgetrs(self.factors, self.pivots, right)[0])
+            return np.asarray(dgetrs(self.factors, self.pivots, right, overwrite_b=overwrite)[0])
         if self.rows is None or self.columns is None:  # factorizing again is nothing beside threads that dgetrs starts
             return np.asarray(dgesv(self.scaled, right)[2])
         right = right * self.rows[:, None]

@@ -101,12 +101,24 @@ class DofPartition:
 
     def from_static(self, static: Numbers) -> Numbers:
         """Return ``T_k p_k``, (n, k), for static coordinates p_k, (n_k, k)."""
-        first = self.n_inertial + self.n_half
         if self.basis is not None:
-            return np.asarray(self.basis[:, first:] @ static)
+            return np.asarray(self.basis[:, self.n_inertial + self.n_half :] @ static)
         q = np.zeros((self.order.size, static.shape[1]), dtype=static.dtype)
-        q[self.order[first:]] = static
+        q[self._static] = static
         return q
+
+    def add_static(self, moved: FloatArray, static: FloatArray) -> None:
+        """Add ``T_k p_k`` in place to what other coordinates move, (n, k); in a selection that is nothing there."""
+        if self.basis is not None:
+            moved += self.basis[:, self.n_inertial + self.n_half :] @ static
+        else:
+            moved[self._static] = static
+
+    @property
+    def _static(self) -> IndexArray | slice:
+        """The static DOFs of a selection."""
+        first = self.n_inertial + self.n_half
+        return slice(first, None) if self.in_order else self.order[first:]
 
     def to_coordinates(self, displacements: FloatArray) -> FloatArray:
         """Return ``p = T^-1 q`` for an (n, k) array."""

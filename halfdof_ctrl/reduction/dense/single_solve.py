@@ -38,15 +38,15 @@ def solved_at_once(model: SecondOrderModel, partition: DofPartition, leading: Le
     m, N = model.B.shape[1], moving + n_i
     forces = (model.B,) if is_zero(model.Bv, model.Ba) else trimmed(model.quadratics.B)
     right = np.empty((model.M.shape[0], N + m * len(forces)), order="F")
-    right[:, :moving] = -partition.times_basis(model.K, 0, moving)
-    right[:, moving:N] = -partition.times_basis(model.C, 0, n_i)
+    np.negative(partition.times_basis(model.K, 0, moving), out=right[:, :moving])
+    np.negative(partition.times_basis(model.C, 0, n_i), out=right[:, moving:N])
     for k, matrix in enumerate(forces):
         right[:, N + k * m : N + (k + 1) * m] = matrix
-    solved = leading.solve(right)
+    solved = leading.solve(right, overwrite=True)
+    solved += 0.0  # leaves no negative zeros to be printed
     rate = np.zeros((N, right.shape[1]), order="F")  # x' as function of x, u, u', ...
     rate[n_i:moving] = solved[n_i:moving]
     rate[moving:] = solved[:n_i]
-    rate += 0.0  # leaves no negative zeros to be printed
     A = rate[:, :N]
     A[:n_i, moving:] = unit_matrix(n_i)
     if len(forces) == 1:
@@ -130,7 +130,7 @@ def _displacement(partition: DofPartition, solved: FloatArray, m: int, shift: tu
         X[:, :moving] = partition.T[:, :moving]
     inputs: tuple[FloatArray, ...] = ()
     if moving < n:
-        X += partition.from_static(solved[moving:, :N])
+        partition.add_static(X, solved[moving:, :N])
         inputs = tuple(
             [partition.from_static(solved[moving:, start : start + m]) for start in range(N, solved.shape[1], m)]
         )

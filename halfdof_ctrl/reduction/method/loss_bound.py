@@ -141,8 +141,11 @@ def _points(A: FloatArray) -> ComplexArray:
 def are_kept(signal: Signal, x: FloatArray) -> bool:
     """Return whether signals at rest, where states are -x times inputs, are no small differences of their parts."""
     direct = signal.direct(x.shape[1])
-    terms = (np.abs(signal.X) @ np.abs(x) + np.abs(direct)).max(axis=0, initial=0.0)
-    return bool((terms <= EVEN_STATES * np.abs(direct - signal.X @ x).max(axis=0, initial=0.0)).all())
+    terms = np.abs(signal.X) @ np.abs(x)
+    terms += np.abs(direct)
+    left = signal.X @ x
+    np.abs(np.subtract(direct, left, out=left), out=left)
+    return bool((terms.max(axis=0, initial=0.0) <= EVEN_STATES * left.max(axis=0, initial=0.0)).all())
 
 
 def _are_seen(model: SecondOrderModel, equations: StateEquations, x: FloatArray) -> bool:

@@ -12,7 +12,7 @@ from itertools import zip_longest
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import FloatArray, is_zero, unit_matrix
+from halfdof_ctrl.base.arrays import FloatArray, is_unit, is_zero
 from halfdof_ctrl.base.doors import is_whole_number, shown
 from halfdof_ctrl.base.errors import ParameterError
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -133,7 +133,7 @@ def output_signal(model: SecondOrderModel, equations: StateEquations, rounding: 
         Gives the rounding errors of the equations; called where derivatives of the inputs show at all.
     """
     q = equations.displacement
-    output = q if model.F is unit_matrix(len(model.F)) else q.combined(model.F)  # all displacements, mostly
+    output = q if is_unit(model.F) else q.combined(model.F)  # all displacements, mostly
     if not is_zero(model.G):
         output = output.plus(q.combined(model.G).derivative(equations.A, equations.B))
     if not is_zero(model.H):

@@ -42,6 +42,18 @@ def test_solution_is_that_of_numpy(seed: int, spread: int) -> None:
     assert_allclose(solved / scale, desired / scale, rtol=0.0, atol=ROUNDOFF)
 
 
+@pytest.mark.parametrize("size", [4, 12])
+def test_solution_is_the_same_in_the_place_of_the_right_hand_side(size: int) -> None:
+    """`overwrite` changes no bit of it, and without it the right-hand side stays."""
+    generator = np.random.default_rng(0)
+    leading = LeadingMatrix.factorized(np.asfortranarray(generator.standard_normal((size, size)) + 9.0 * np.eye(size)))
+    right = np.asfortranarray(generator.standard_normal((size, 5)))
+    kept = right.copy(order="F")
+    solved = leading.solve(right)
+    assert_array_equal(right, kept)
+    assert_array_equal(leading.solve(kept, overwrite=True), solved)
+
+
 @given(seed=SEEDS, spread=st.sampled_from([0, 5, 40]))
 def test_singular_values_are_those_of_the_matrix_that_was_factorized(seed: int, spread: int) -> None:
     """Of W, or of the scaled one."""

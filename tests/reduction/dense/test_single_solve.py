@@ -64,6 +64,17 @@ def test_static_dof_follows_force_and_neighbour() -> None:
     assert_allclose(equations.A, np.array([[0, 1], [-0.8, 0]]), rtol=ROUNDOFF)
 
 
+@pytest.mark.parametrize("size", [3, 40])
+def test_what_inputs_do_at_once_has_no_negative_zeros(size: int) -> None:
+    """Static DOFs of negative stiffness, as pressures are, answer the forces on others by 0, not by -0."""
+    stiffness = -np.eye(size)
+    stiffness[0, 0] = 5.0
+    output = exact_reduction(mechss(np.diag([1.0] + [0.0] * (size - 1)), None, stiffness)).output
+    assert_array_equal(output.direct(size), np.diag([0.0] + [-1.0] * (size - 1)))
+    assert not np.signbit(output.direct(size)[output.direct(size) == 0.0]).any()
+    assert not np.signbit(output.X[output.X == 0.0]).any()
+
+
 @pytest.mark.parametrize("kind", ["Bv", "Ba"])
 def test_derivatives_of_inputs_are_absorbed(kind: str) -> None:
     """``2 q'' + 3 q' + 5 q`` under u' or u'': (5) shifts the state by E_0, and by E_1 for u''."""
