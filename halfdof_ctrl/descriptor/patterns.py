@@ -44,13 +44,15 @@ def diagonal_blocks(pattern: BoolArray) -> list[tuple[Places, Places]]:
     >>> [(rows.tolist(), columns.tolist()) for rows, columns in diagonal_blocks(pattern)]
     [([0], [0, 1, 2]), ([1, 2], [3])]
     """
-    matched = maximum_bipartite_matching(csr_array(pattern), perm_type="column").astype(np.intp)
+    if pattern.shape in {(0, 0), (1, 1)} and pattern.all():  # as most are that deflation leaves
+        return [(np.arange(1), np.arange(1))] if pattern.size else []
+    matched = maximum_bipartite_matching(_graph(pattern), perm_type="column").astype(np.intp)
     tall = _reached(pattern, matched)
     wide = _reached(pattern.T, _inverse(matched, pattern.shape[1]))[::-1]
     rows = np.flatnonzero(~(tall[0] | wide[0]))
     partners = matched[rows]
     square = pattern[np.ix_(rows, partners)]
-    count, labels = connected_components(csr_array(square.astype(np.int8)), directed=True, connection="strong")
+    count, labels = connected_components(_graph(square), directed=True, connection="strong")
     members = [np.flatnonzero(labels == label) for label in range(count)]
     corners = [
         (np.flatnonzero(block[0]), np.flatnonzero(block[1]))
@@ -72,9 +74,16 @@ def connected_parts(pattern: BoolArray) -> list[tuple[Places, Places]]:
     k, size = pattern.shape[0], sum(pattern.shape)
     graph = np.zeros((size, size), dtype=bool)
     graph[:k, k:] = pattern
-    count, labels = connected_components(csr_array(graph.astype(np.int8)), directed=False)
+    count, labels = connected_components(_graph(graph), directed=False)
     parts = [(np.flatnonzero(labels[:k] == label), np.flatnonzero(labels[k:] == label)) for label in range(count)]
     return [part for part in parts if part[0].size and part[1].size]
+
+
+def _graph(pattern: BoolArray) -> csr_array:
+    """Return the graph of a pattern as the algorithms for graphs work with it, without the checks of a conversion."""
+    columns, lengths = np.nonzero(pattern)[1], np.count_nonzero(pattern, axis=1)
+    starts = np.concatenate([[0], np.cumsum(lengths)])
+    return csr_array((np.ones(columns.size), columns.astype(np.int32), starts.astype(np.int32)), shape=pattern.shape)
 
 
 def _reached(pattern: BoolArray, matched: Places) -> tuple[BoolArray, BoolArray]:

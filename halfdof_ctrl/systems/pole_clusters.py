@@ -85,6 +85,8 @@ def _groups(A: FloatArray, values: ComplexArray, data: FloatArray, cosine: Float
     chain = CHAIN * np.abs(values) + NEIGHBOURHOOD * UNIT_ROUNDOFF * size
     reach = np.where(cosine > DEFECTIVE * n * UNIT_ROUNDOFF, NEIGHBOURHOOD * np.minimum(data, size), chain)
     linked = np.abs(values[:, None] - values) <= np.maximum(reach[:, None] + reach, ONE_POLE * np.abs(values))
+    if np.count_nonzero(linked) == np.count_nonzero(np.diagonal(linked)):  # each but with itself, as mostly
+        return []
     count, label = connected_components(linked, directed=False)
     groups = [np.flatnonzero(label == k) for k in range(count)]
     return [group for group in groups if group.size > 1]

@@ -12,7 +12,7 @@ matrix ``diag(r) X diag(c)``. Of four scalings,
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -227,8 +227,11 @@ def _scaling_logs(
     i: IndexArray, j: IndexArray, logs: FloatArray, shape: tuple[int, int], settled: float
 ) -> tuple[FloatArray, FloatArray]:
     """Minimize the squares of ``logs + r_i + c_j`` by conjugate gradients on c (Curtis and Reid, 1972)."""
-    pattern = csr_array((np.ones(i.size), (i, j)), shape=shape)
-    times = np.asarray(pattern.toarray()) if max(shape) <= DENSE_PATTERN_ROWS else pattern
+    times: Any
+    if max(shape) <= DENSE_PATTERN_ROWS:
+        times = np.bincount(i * shape[1] + j, minlength=shape[0] * shape[1]).reshape(shape).astype(np.float64)
+    else:
+        times = csr_array((np.ones(i.size), (i, j)), shape=shape)
     back = times.T
     in_row, in_column = (np.maximum(np.bincount(k, minlength=n), 1) for k, n in zip((i, j), shape, strict=True))
     by_row = -np.bincount(i, logs, shape[0])
@@ -251,6 +254,9 @@ def _scaling_logs(
 
 def _entries(matrix: Matrix) -> tuple[IndexArray, IndexArray, FloatArray]:
     """Return the rows, columns and sizes of the nonzero entries."""
+    if isinstance(matrix, np.ndarray):
+        places = np.nonzero(matrix)
+        return places[0], places[1], np.abs(matrix[places])
     entries = coo_array(matrix)
     present = np.flatnonzero(entries.data)
     i, j = entries.coords
