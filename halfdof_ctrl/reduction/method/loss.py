@@ -222,7 +222,8 @@ class _Comparison:
         few = len(model.dofs) <= FEW_DOFS
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
         points = points[np.argsort(np.abs(points))]
-        speed = typical_speeds(model)[-1] if few else float(np.median(np.abs(points))) if N else 1.0
+        speeds = typical_speeds(model) if few else [float(np.median(np.abs(points))) if N else 1.0]
+        speed = speeds[-1]
         rows, columns = scaling = max_scaling(sizes_at(model.quadratics.P, speed), even=2.0)
         B = [rows[:, None] * part for part in columns_of(model.quadratics.B, chosen)]
         inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
@@ -238,7 +239,7 @@ class _Comparison:
         states = state_equations(A, into, output.X * scale, direct)
         slow = NOTHING_SLOW
         if few:
-            points, slow = points_of_few(model, stored.A, _speeds_of_signals(motion))
+            points, slow = points_of_few(model, stored.A, speeds, _speeds_of_signals(motion))
         return cls(
             stored=stored,
             points=points,

@@ -100,17 +100,21 @@ class Slow(NamedTuple):
 NOTHING_SLOW = Slow(0.0, 0.0)
 
 
-def points_of_few(model: SecondOrderModel, A: FloatArray, signals: Sequence[float]) -> tuple[ComplexArray, Slow]:
+def points_of_few(
+    model: SecondOrderModel, A: FloatArray, speeds: Sequence[float], signals: Sequence[float]
+) -> tuple[ComplexArray, Slow]:
     """Choose points for a model of few DOFs, and say which are slow for it.
 
     Parameters
     ----------
     model : SecondOrderModel
     A : (N, N) ndarray
+    speeds : sequence of float
+        `typical_speeds`.
     signals : sequence of float
         `signal_speeds`.
     """
-    speeds, sizes = typical_speeds(model), np.sort(np.abs(np.linalg.eigvals(A)))
+    sizes = np.sort(np.abs(np.linalg.eigvals(A)))
     at_origin, exactly = _poles_at_origin(model, sizes, SLOWEST_SPEED * min(speeds))
     slowest = sizes[at_origin] / 2.0 if exactly and at_origin < sizes.size else SLOWEST_SPEED * min(speeds)
     slow = np.abs(loss_points(A)) if len(A) else np.zeros(0)

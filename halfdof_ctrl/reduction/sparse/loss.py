@@ -97,14 +97,15 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
     large, by_W = len(model.dofs) > MIXED_FROM, len(model.dofs) > FACTORIZED_DOFS and N <= STATES_BY_W
     chosen = looked_at(m, MOST_INPUTS)
     first = _mixture(stored.B) if large else _picked(chosen, m)
-    comparison = _Comparison.of(stored, model, first, by_W=by_W)
+    ground = _Ground.of(stored, model, by_W=by_W)
+    comparison = ground.driven_by(first)
     points = comparison.points()
     if large or filled > FILLED:
         points = points[: 1 if by_W else POINTS_OF_LARGE]
     if large:
         if not _is_suspect(comparison, points):
             return Measurement(model, np.zeros(0, dtype=np.intp), NOTHING_SLOW, ())
-        comparison = _Comparison.of(stored, model, _picked(chosen, m), by_W=by_W)
+        comparison = ground.driven_by(_picked(chosen, m))
     return Measurement(
         model, chosen, NOTHING_SLOW, [(points[k : k + 1], comparison.at(s)) for k, s in enumerate(points.tolist())]
     )
@@ -137,6 +138,60 @@ def _mixture(B: FloatArray) -> SparseMatrix:
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class _Ground:
+    """What comparisons have in common, whatever drives the model."""
+
+    stored: SparselyStored
+    model: SecondOrderModel  #: with the outputs that are looked at
+    by_W: bool  #: whether W is what solves for all DOFs
+    speed: float  #: typical of the masses
+    scaling: Scaling  #: of the equations of motion
+    P: Sequence[SparseMatrix]  #: scaled
+    F: Sequence[SparseMatrix]  #: what the outputs see of the scaled unknowns
+
+    @classmethod
+    def of(cls, stored: SparselyStored, model: SecondOrderModel, *, by_W: bool) -> "_Ground":
+        speeds = own_speeds(model)
+        speed = float(np.sqrt(np.median(speeds[speeds > 0.0]))) if (speeds > 0.0).any() else 1.0
+        P = [as_sparse(part) for part in model.quadratics.P]
+        scaling = max_scaling(csc_array(sizes_at(P, speed)), even=2.0)
+        seen = Scaling(np.ones(len(model.outputs)), scaling.columns)
+        return cls(
+            stored=stored,
+            model=model,
+            by_W=by_W,
+            speed=speed,
+            scaling=scaling,
+            P=[scaling.of_sparse(part) for part in P],
+            F=[seen.of_sparse(as_sparse(part)) for part in model.quadratics.F],
+        )
+
+    def driven_by(self, mix: SparseMatrix) -> "_Comparison":
+        """Return the comparison for inputs, or mixtures of them: the columns of (m, k) weights."""
+        stored, model = self.stored, self.model
+        B = [self.scaling.rows[:, None] * _dense(as_sparse(part) @ mix) for part in model.quadratics.B]
+        inputs = powers_of_two(np.asarray(sizes_at(B, self.speed)).max(axis=0, initial=0.0))
+        motion = Equations(
+            R=self.P,
+            B=[part * inputs for part in B],
+            C=self.F,
+            D=[_dense(as_sparse(part) @ mix) * inputs for part in model.quadratics.D],
+        )
+        (A, balance), output = balanced_states(stored.A), stored.output(model)
+        into = np.asarray(stored.B @ mix) * inputs / balance[:, None]
+        direct = [np.asarray(part @ mix) * inputs for part in output.U] or [np.zeros((len(output.X), inputs.size))]
+        return _Comparison(
+            stored=stored,
+            by_W=self.by_W,
+            scaling=self.scaling,
+            motion=motion,
+            states=state_equations(A, into, output.X * balance, direct),
+            balance=balance,
+            inputs=_dense(mix) * inputs,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Comparison:
     """A model and its stored state space in even units, for k inputs or mixtures of them."""
 
@@ -147,36 +202,6 @@ class _Comparison:
     states: Equations  #: of the state space, balanced
     balance: FloatArray  #: (N,) what the balanced states are multiplied by
     inputs: FloatArray  #: (m, k) the inputs that the columns stand for
-
-    @classmethod
-    def of(cls, stored: SparselyStored, model: SecondOrderModel, mix: SparseMatrix, *, by_W: bool) -> "_Comparison":
-        speeds = own_speeds(model)
-        speed = float(np.sqrt(np.median(speeds[speeds > 0.0]))) if (speeds > 0.0).any() else 1.0
-        P = [as_sparse(part) for part in model.quadratics.P]
-        scaling = max_scaling(csc_array(sizes_at(P, speed)), even=2.0)
-        rows, columns = scaling
-        B = [rows[:, None] * _dense(as_sparse(part) @ mix) for part in model.quadratics.B]
-        inputs = powers_of_two(np.asarray(sizes_at(B, speed)).max(axis=0, initial=0.0))
-        seen = Scaling(np.ones(len(model.outputs)), columns)
-        motion = Equations(
-            R=[scaling.of_sparse(part) for part in P],
-            B=[part * inputs for part in B],
-            C=[seen.of_sparse(as_sparse(part)) for part in model.quadratics.F],
-            D=[_dense(as_sparse(part) @ mix) * inputs for part in model.quadratics.D],
-        )
-        (A, balance), output = balanced_states(stored.A), stored.output(model)
-        into = np.asarray(stored.B @ mix) * inputs / balance[:, None]
-        direct = [np.asarray(part @ mix) * inputs for part in output.U] or [np.zeros((len(output.X), inputs.size))]
-        states = state_equations(A, into, output.X * balance, direct)
-        return cls(
-            stored=stored,
-            by_W=by_W,
-            scaling=scaling,
-            motion=motion,
-            states=states,
-            balance=balance,
-            inputs=_dense(mix) * inputs,
-        )
 
     def points(self) -> ComplexArray:
         """Choose points, those first that tell most: beside the slowest modes, and up to where masses swing alone."""
