@@ -25,6 +25,7 @@ SIGNAL_WORDS = {
     "input": ("u", "the unit force on a DOF", "B"),
     "output": ("y", "a DOF's motion", "F, G, H"),
 }  #: letter of a nameless signal, what its physical name would mean, and the matrices that decide
+LISTS = (tuple, list)  #: what names mostly come in, known at once
 MOST_NAMES = 10**8  #: more than memory holds: an iterator without an end is stopped there
 MOST_LISTED = 8  #: names that a message spells out
 LARGEST_NUMBER = 10**18  #: node numbers of all programs are smaller
@@ -241,7 +242,7 @@ def as_tuple(names: Names, what: str = "") -> tuple[str, ...]:
         return (str(names),)
     if names is None:
         return ()
-    if isinstance(names, set | frozenset | Mapping | bytes):
+    if type(names) not in LISTS and isinstance(names, set | frozenset | Mapping | bytes):
         raise _no_names_error(names, what)
     try:
         found = tuple(islice(names, MOST_NAMES))

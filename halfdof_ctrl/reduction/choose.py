@@ -13,6 +13,7 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.deflation.method import by_deflation
 from halfdof_ctrl.reduction.dense.method import by_bases, by_selection
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
+from halfdof_ctrl.reduction.method.evidence import Evidence
 from halfdof_ctrl.reduction.method.exact_order import warn_of_hidden_states
 from halfdof_ctrl.reduction.method.file_digits import warn_of_file_digits
 from halfdof_ctrl.reduction.method.protocol import METHODS, MethodName, ReductionMethod
@@ -83,8 +84,8 @@ def exact_reduction(
     >>> exact_reduction(mechss([[0]], [[5]], [[10]])).A
     array([[-2.]])
     """
-    reduction = reduced(model, tol=tol, method=method)
-    reduction.solution.evidence.warn_of_loss()
+    reduction, evidence = _reduced(model, tol, method)
+    evidence.warn_of_loss()
     return reduction
 
 
@@ -93,6 +94,11 @@ def reduced(model: SecondOrderModel, *, tol: float | None = None, method: Method
 
     For those who go on in other states: whoever uses A and B says so by `Evidence.warn_of_loss`.
     """
+    return _reduced(model, tol, method)[0]
+
+
+def _reduced(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> tuple[ExactReduction, Evidence]:
+    """Reduce a model and return what the reduction rests on beside it, with all said but what A and B lose."""
     if checked_model(model, "exact_reduction").is_complex:
         raise complex_model_error(model)
     _require_valid(tol, method)
@@ -104,7 +110,7 @@ def reduced(model: SecondOrderModel, *, tol: float | None = None, method: Method
     if tol is None and solution.name != "selection" and not evidence.is_doubtful:
         warn_of_hidden_states(model, len(solution.A))
     warn_of_file_digits(model, evidence.rcond, tol)
-    return ExactReduction(model=solution.model, solution=solution, tol=tol)
+    return ExactReduction(model=solution.model, solution=solution, tol=tol), evidence
 
 
 def _solved(model: SecondOrderModel, tol: float | None, method: MethodName | None) -> ReductionMethod:
