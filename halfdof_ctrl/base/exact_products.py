@@ -21,6 +21,7 @@ from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 SMALL_MATRIX = 2500  #: entries of a matrix that is multiplied as it is
+ROWS_TOGETHER = 4096  #: of long vectors that are multiplied: what is worked with stays near the processor
 Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
 
@@ -139,6 +140,10 @@ def _turned(parts: FloatArray) -> FloatArray:
 
 def _times(vector: Pair, s: ComplexArray) -> Pair:
     """Return complex numbers with errors, real and imaginary parts side by side, each column times its point."""
+    if len(vector[0]) > ROWS_TOGETHER:
+        starts = range(0, len(vector[0]), ROWS_TOGETHER)
+        pieces = [_times((vector[0][k : k + ROWS_TOGETHER], vector[1][k : k + ROWS_TOGETHER]), s) for k in starts]
+        return np.concatenate([piece[0] for piece in pieces]), np.concatenate([piece[1] for piece in pieces])
     turned = (_turned(vector[0]), _turned(vector[1]))
     return _added(_scaled(vector, np.tile(s.real, 2)), _scaled(turned, np.tile(s.imag, 2)))
 

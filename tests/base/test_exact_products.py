@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from scipy.sparse import csc_array
 
+from halfdof_ctrl.base import exact_products
 from halfdof_ctrl.base.arrays import Matrix
 from halfdof_ctrl.base.exact_products import ExactPolynomial, two_product, two_sum
 
@@ -89,3 +90,14 @@ def test_coefficients_of_zeros_take_nothing_away(kind: Callable[[np.ndarray], Ma
         ExactPolynomial([none, none, entries]).residual(2j, x, right),
         right + np.array([[4.0 + 8.0j], [4.0 + 8.0j], [0.0]]),
     )
+
+
+def test_long_vectors_are_worked_in_pieces_as_they_are_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each row is multiplied by the powers of s for itself: where a piece ends changes no bit."""
+    generator = np.random.default_rng(0)
+    polynomial = ExactPolynomial(list(generator.standard_normal((3, 8, 8))))
+    real, imag = generator.standard_normal((2, 8, 5))
+    x, s = real + 1j * imag, 0.3 + 1.7j
+    whole = polynomial.residual(s, x)
+    monkeypatch.setattr(exact_products, "ROWS_TOGETHER", 3)
+    assert_array_equal(polynomial.residual(s, x), whole)
