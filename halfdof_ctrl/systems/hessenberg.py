@@ -12,18 +12,23 @@ and (10) runs over the states with all points side by side, in blocks that are m
 What Q mixes is lost where the output is small against the state, as in roll-off or far below the fastest pole. To
 first order the relative error of a response H = c x + d is below
 
-    eps |A| |x| |y| / |H|,    (s I - A)^T y = c,    |y| about |x| |c| / |b|,
+    eps max(|A|, |s|) |x| |y| / |H|,    (s I - A)^T y = c.
 
-the last by reciprocity. Where that is much, H is corrected once by the adjoint solution y on the residual in the
-original coordinates, c x + d + y^T (b - (s I - A) x). What is left is the product of the errors of x and y, and what
-rounding does to the residual, entry by entry below
+By reciprocity |y| is about |x| |c| / |b|. How much larger it is (in a chain whose links act one way, in a companion
+form) is found at a few of the points. Where the bound is much, H is corrected once by the adjoint solution y on the
+residual r in the original coordinates, c x + d + y^T r, r = b - (s I - A) x. What is left is the product of the errors
+of x and y, with the residual r_y of y below
+
+    |r| |r_y| |(s I - A)^-1|,    |(s I - A)^-1| at least |x| / |b| and |y| / |c|,
+
+and what rounding does to r, entry by entry below
 
     eps |y|^T (|s| |x| + |A| |x| + |b|);
 
 the rows of the residual are rounded by themselves, so that three times the root of the sum of squares does for many.
 
-Where the first bound exceeds one (at the far end of a long chain) a sparse factorization of s I - A itself keeps the
-digits.
+Where the first bound exceeds one (at the far end of a long chain), or the product says that x and y are too poor (in
+states whose sizes no balancing makes even), a factorization of s I - A itself keeps the digits.
 """
 
 import math
@@ -37,6 +42,7 @@ from scipy.linalg.lapack import dgehrd, dorghr
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.base.threads import limited_threads
+from halfdof_ctrl.systems.adjoint_sizes import beyond_reciprocity
 from halfdof_ctrl.systems.sparse_elimination import sparse_response
 
 OUTER_BLOCK = 24  #: states whose substitution is done before the rest is updated by one matrix product
@@ -49,6 +55,7 @@ ONE_THREAD = 2**18  #: multiplications of a product up to which OpenBLAS takes o
 SAFE_GROWTH = 2.0**125  #: growth from one state to the next up to which it is enough to look once an inner block
 ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
 UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
+UNSAFE_PRODUCT = 1e-11  #: of the errors of x and y, estimated, over the value: above it, too
 RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
 RISK_BY_STATE = 1.25e-12  #: the same for each of many states: the bound grows with their number, errors with its root
 LAPACK_BLOCK = 64  #: most columns that LAPACK's reduction to Hessenberg form works on at once
@@ -145,8 +152,11 @@ class _Channels:
         x = solver.solve(points)
         with np.errstate(invalid="ignore", over="ignore"):
             response = _real_times_complex(rotated, x)
-            size = np.abs(response + direct)
-            bound = EPS * self.size * self.lengths[:, None] * _squared_norms(x) / abs(solver.beta)
+            size, squares = np.abs(response + direct), _squared_norms(x)
+            bound = EPS * self.lengths[:, None] * (np.maximum(self.size, np.abs(points)) * squares / abs(solver.beta))
+            if len(solver.H) > 1:
+                sizes = np.sqrt(squares)
+                bound *= beyond_reciprocity(solver.H, solver.beta, rotated, self.lengths, points, sizes)[:, None]
             small, hopeless = bound > self.risk * size, bound > size
             cancelled = EPS * np.abs(direct) > self.risk * size  # which no solution of another x mends
         if cancelled.any():
@@ -185,7 +195,9 @@ class _Channels:
         correction = (y * residual).sum(axis=0)
         refined = np.asarray(_real_times_complex(c[None], state)[0] + correction)
         total = np.abs(refined + direct)
-        unsafe = np.abs(correction) > UNSAFE_CORRECTION * total
+        left = _norms(residual) * _norms(c[:, None] - points * y + _real_times_complex(self.A.T, y))
+        left *= np.maximum(_norms(x) / abs(solver.beta), _norms(y) / abs(adjoint.beta))
+        unsafe = ~((np.abs(correction) <= UNSAFE_CORRECTION * total) & (left <= UNSAFE_PRODUCT * total))
         if unsafe.any():
             refined[unsafe] = sparse_response(self.A, b, c, points[unsafe])
             self.bound = np.inf
@@ -305,6 +317,10 @@ def _sums(matrix: FloatArray, x: FloatArray) -> FloatArray:
 def _real_times_complex(matrix: FloatArray, x: ComplexArray) -> ComplexArray:
     """Multiply as one real product, half the work of a complex one."""
     return (matrix @ np.ascontiguousarray(x).view(np.float64)).view(np.complex128)
+
+
+def _norms(x: ComplexArray) -> FloatArray:
+    return np.sqrt(_squared_norms(np.ascontiguousarray(x)))
 
 
 def _squared_norms(x: ComplexArray) -> FloatArray:

@@ -2,7 +2,8 @@
 
 One sparse factorization in the middle of the points fixes the order of the pivots; the elimination then runs once,
 row by row, with all points side by side. Where that order does not suit a point (its componentwise backward error
-is not small), and where the factors would fill up, the point is factorized by itself.
+is more than rounding), and where the factors would fill up, the point is factorized by itself, and refined where
+s I - A is nearly singular.
 """
 
 from heapq import heapify, heappop, heappush
@@ -13,13 +14,14 @@ import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
-from halfdof_ctrl.base.sparse_factors import sparse_lu
+from halfdof_ctrl.base.sparse_factors import CORRECTED_ABOVE, sparse_lu
+from halfdof_ctrl.model.evaluation import quadratic_transfer
 
 IndexArray: TypeAlias = npt.NDArray[np.signedinteger[Any]]
 Row: TypeAlias = dict[int, complex | ComplexArray]  #: entries of a matrix row by column, one or all points
 
 SPARSE_FACTORS = 20  #: entries per row of the factors up to which all points are worked side by side
-FACTORIZED_ALONE_ABOVE = 1e-12  #: componentwise; a point above it is factorized by itself
+SPARSE_STATES = 60  #: from which on factors of few entries are made as such where a point is factorized by itself
 
 
 def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray) -> ComplexArray:
@@ -38,23 +40,30 @@ def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: Complex
     present = csc_array((A != 0.0) | np.eye(A.shape[0], dtype=bool))
     columns = np.repeat(np.arange(A.shape[0]), np.diff(present.indptr))
     entries, diagonal = -A[present.indices, columns].astype(np.complex128), present.indices == columns
-    values = np.full(points.size, complex(np.nan, np.nan))
+    values, is_sparse = np.full(points.size, complex(np.nan, np.nan)), False
 
     def shifted(s: complex) -> csc_array:
         return csc_array((entries + s * diagonal, present.indices, present.indptr), shape=A.shape)
 
     try:
         factors = sparse_lu(shifted(points[points.size // 2]))
-        if factors.nnz <= SPARSE_FACTORS * A.shape[0]:
+        is_sparse = factors.nnz <= SPARSE_FACTORS * A.shape[0]
+        if is_sparse:
             values = _side_by_side(A, b, c, points, (factors.perm_r, factors.perm_c))
     except RuntimeError:  # a pole: every point is looked at by itself
         pass
-    for k in np.flatnonzero(np.isnan(values)).tolist():
-        try:
-            values[k] = c @ sparse_lu(shifted(points[k])).solve(b.astype(np.complex128))
-        except RuntimeError:
-            values[k] = complex(np.inf, np.nan)
+    left = np.isnan(values)
+    if left.any():
+        values[left] = _alone(A, b, c, points[left], is_sparse=is_sparse)
     return values
+
+
+def _alone(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray, *, is_sparse: bool) -> ComplexArray:
+    """Evaluate as a descriptor form is, which refines."""
+    parts = ([-A, np.eye(len(A))], [b[:, None]], [c[None]], [np.zeros((1, 1))])
+    kind = csc_array if is_sparse and len(A) > SPARSE_STATES else np.asarray
+    P, B, F, D = ([kind(part) for part in each] for each in parts)
+    return np.asarray(quadratic_transfer(P, B, F, D, points)[0, 0])
 
 
 def _side_by_side(
@@ -73,7 +82,7 @@ def _side_by_side(
         for i, row in zip(rows, matrix, strict=True):
             terms = [value * x[q] for q, value in row.items()]
             size = sum(np.abs(term) for term in terms) + abs(b[i])
-            good &= np.abs(b[i] - sum(terms)) <= FACTORIZED_ALONE_ABOVE * size
+            good &= np.abs(b[i] - sum(terms)) <= CORRECTED_ABOVE * size
         value = sum(c[old] * x[new] for old, new in place.items() if c[old] != 0.0)
     return np.where(good, value, complex(np.nan, np.nan))
 

@@ -235,3 +235,31 @@ def test_what_d_cancels_is_no_part_of_a_bound() -> None:
         right = -(omega**2) / (4.0 - omega**2 + 0.5j * omega)
         assert abs(found.values[0, 0, 0] - right) <= found.bound * abs(right)
     assert bounded_response(A, B, C, D, np.array([1j])).bound < POINTWISE
+
+
+def far_from(desired: npt.NDArray[np.complex128], values: npt.NDArray[np.complex128]) -> float:
+    """Give the largest error, each relative to its value."""
+    return float(np.abs(values / desired - 1.0).max())
+
+
+@pytest.mark.parametrize("seed", [5, 9, 43])
+def test_chains_that_act_one_way_keep_their_digits(seed: int) -> None:
+    """Links of 1e-3 to 1e3 one way and much weaker ones back: reciprocity says far too little of the adjoint."""
+    generator, n = np.random.default_rng(seed), 16
+    A = -np.diag(10.0 ** generator.uniform(-2, 2, n)) + np.diag(10.0 ** generator.uniform(-3, 3, n - 1), 1)
+    A += np.diag(10.0 ** generator.uniform(-6, 0, n - 1), -1)
+    B, C = (np.where(generator.random(shape) < 0.3, 1.0, 0.0) for shape in ((n, 1), (1, n)))
+    D, points = np.zeros((1, 1)), on_axis(np.geomspace(1e-4, 1e4, 20))
+    desired = np.array([reference(A, B, C, D, s)[0, 0] for s in points])
+    assert far_from(desired, state_space_response(A, B, C, D, points)[0, 0]) < POINTWISE
+
+
+@pytest.mark.parametrize("states", [12, 16, 20])
+def test_entries_over_many_decades_keep_their_digits(states: int) -> None:
+    """Rows and columns that fall by 8 a state: far below the fast ones both x and y are too poor to be corrected."""
+    place = np.arange(states)
+    A = np.random.default_rng(states).standard_normal((states, states)) * 8.0 ** -np.add.outer(place, place)
+    B, C, D = np.ones((states, 1)), np.ones((1, states)), np.zeros((1, 1))
+    points = on_axis(np.geomspace(1e-18, 1e2, 20))
+    desired = np.array([reference(A, B, C, D, s)[0, 0] for s in points])
+    assert far_from(desired, state_space_response(A, B, C, D, points)[0, 0]) < POINTWISE
