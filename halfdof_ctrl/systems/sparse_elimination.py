@@ -60,7 +60,8 @@ def sparse_response(A: FloatArray, b: FloatArray, c: FloatArray, points: Complex
 
 def _alone(A: FloatArray, b: FloatArray, c: FloatArray, points: ComplexArray, *, is_sparse: bool) -> ComplexArray:
     """Evaluate as a descriptor form is, which refines."""
-    parts = ([-A, np.eye(len(A))], [b[:, None]], [c[None]], [np.zeros((1, 1))])
+    none, unit = np.zeros_like(A), np.eye(len(A))
+    parts = ([-A, unit, none], [b[:, None]] + 2 * [none[:, :1]], [c[None]] + 2 * [none[:1]], 3 * [none[:1, :1]])
     kind = csc_array if is_sparse and len(A) > SPARSE_STATES else np.asarray
     P, B, F, D = ([kind(part) for part in each] for each in parts)
     return np.asarray(quadratic_transfer(P, B, F, D, points)[0, 0])

@@ -1,9 +1,10 @@
 """Solutions that keep the zeros of A: chains whose far end answers 1e-100 of the near one, dense and singular ones."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
-from halfdof_ctrl.systems.sparse_elimination import sparse_response
+from halfdof_ctrl.systems.sparse_elimination import SPARSE_STATES, sparse_response
 
 COMPARED = 1e-12  # two elimination orders on matrices of moderate condition
 
@@ -38,6 +39,16 @@ def test_pivots_that_do_not_suit_a_point_are_chosen_anew() -> None:
     points = np.array([0.0, 1e3, 1e4], dtype=complex)
     expected = [np.linalg.solve(s * np.eye(3) - A, np.ones(3))[0] for s in points]
     assert_allclose(sparse_response(A, np.ones(3), np.eye(3)[0], points), expected, rtol=COMPARED)
+
+
+@pytest.mark.parametrize("size", [SPARSE_STATES - 1, SPARSE_STATES + 1])
+def test_pivots_are_chosen_anew_among_many_states(size: int) -> None:
+    """The same three states beside a ladder that they do not touch: sparse factors, of few states full ones."""
+    A, b, points = ladder(size), np.zeros(size), np.array([0.0, 1e3, 1e4], dtype=complex)
+    A[:4, :4], b[:3] = np.diag([0.0, 0.0, 0.0, -2.0]), 1.0
+    A[:3, :3] = [[-1e-20, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, -1.0]]
+    expected = [np.linalg.solve(s * np.eye(3) - A[:3, :3], np.ones(3))[0] for s in points]
+    assert_allclose(sparse_response(A, b, np.eye(size)[0], points), expected, rtol=COMPARED)
 
 
 def test_pole_is_infinite() -> None:

@@ -36,7 +36,12 @@ from halfdof_ctrl.reduction.method.loss import (
     measured,
     measured_loss,
 )
-from halfdof_ctrl.reduction.method.loss_bound import is_bounded, is_well_conditioned, loses_nothing
+from halfdof_ctrl.reduction.method.loss_bound import (
+    is_bounded,
+    is_well_conditioned,
+    loses_nothing,
+    reads_rates_of_massless,
+)
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.proof import expected_loss, has_spectrum
 from halfdof_ctrl.reduction.method.protocol import MethodName
@@ -205,8 +210,11 @@ def _loses_nothing(found: SingleSolve) -> bool:
         may_cancel = few and part.n_static > 0 and len(found.A) > 0  # what static DOFs leave of K, to rounding
         nothing = not may_cancel and loses_nothing(found.model, found.equations, even=found.is_even)
         return nothing or _is_bounded(found)
-    inertial = np.zeros(len(found.model.dofs), dtype=np.bool_)
-    inertial[part.order[: part.n_inertial]] = True
+    massless, static = part.order[part.n_inertial :], part.order[part.n_inertial + part.n_half :]
+    if reads_rates_of_massless(found.model, massless, static):
+        return False
+    inertial = np.ones(len(found.model.dofs), dtype=np.bool_)
+    inertial[massless] = False
     return not spread_is_wide(found.model, inertial)
 
 

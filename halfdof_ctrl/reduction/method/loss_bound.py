@@ -11,7 +11,16 @@ the value, that says nothing. Derivation: docs/explanation/evaluation.md.
 
 import numpy as np
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, as_dense, has_even_entries, is_zero, powers_of_two
+from halfdof_ctrl.base.arrays import (
+    EPS,
+    ComplexArray,
+    FloatArray,
+    IndexArray,
+    as_dense,
+    has_even_entries,
+    is_zero,
+    powers_of_two,
+)
 from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS, lu_and_rcond
@@ -136,6 +145,22 @@ def _points(A: FloatArray) -> ComplexArray:
     modes = size[np.unique(np.linspace(0.0, 1.0, BOUNDED_AT) ** 2 * (size.size - 1) // 1).astype(np.intp)]
     between = np.geomspace(BELOW_ALL * size[0], size[-1], BETWEEN)
     return np.asarray(1j * BESIDE_MODE * np.sort(np.append(modes, between)))
+
+
+def reads_rates_of_massless(model: SecondOrderModel, massless: IndexArray, static: IndexArray) -> bool:
+    """Tell whether outputs read accelerations of DOFs without mass, or velocities of static ones.
+
+    No state and no row of A is one of these. They are products of rows of A, whose terms cancel at slow modes though
+    masses are of one size.
+
+    Parameters
+    ----------
+    model : SecondOrderModel
+    massless, static : (k,), (l,) ndarrays
+        Places of the DOFs without mass, and of those of them without damping.
+    """
+    rates = ((model.H, massless), (model.G, static))
+    return not all(is_zero(part) or is_zero(part[:, places]) for part, places in rates)
 
 
 def are_kept(signal: Signal, x: FloatArray) -> bool:

@@ -32,7 +32,7 @@ from halfdof_ctrl.reduction.method.loss import (
     loss_of,
     measured_loss,
 )
-from halfdof_ctrl.reduction.method.loss_bound import are_kept, is_well_conditioned
+from halfdof_ctrl.reduction.method.loss_bound import are_kept, is_well_conditioned, reads_rates_of_massless
 from halfdof_ctrl.reduction.method.masses import spread_is_wide
 from halfdof_ctrl.reduction.method.protocol import MethodName
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver
@@ -40,7 +40,7 @@ from halfdof_ctrl.reduction.method.signals import Signal
 from halfdof_ctrl.reduction.sparse.bases import sparse_bases
 from halfdof_ctrl.reduction.sparse.displacement import SparseDisplacement
 from halfdof_ctrl.reduction.sparse.loss import measured_sparsely
-from halfdof_ctrl.reduction.sparse.partition import INERTIAL, SparsePartition
+from halfdof_ctrl.reduction.sparse.partition import INERTIAL, STATIC, SparsePartition
 from halfdof_ctrl.reduction.sparse.selection import has_dependent_columns, select_sparse_columns
 from halfdof_ctrl.reduction.sparse.single_solve import require_states, solved_by_rows, sparse_leading_columns
 
@@ -252,7 +252,9 @@ def _loses_nothing(found: SparseSolve) -> bool:
     """Tell whether nothing is lost of a small model; whatever is no plain case is left to its dense copy."""
     model, N = found.model, len(found.A)
     if N > ASKED_STATES:
-        return not spread_is_wide(model, found.coordinates.kinds == INERTIAL)
+        kinds = found.coordinates.kinds
+        rates = reads_rates_of_massless(model, np.flatnonzero(kinds != INERTIAL), np.flatnonzero(kinds == STATIC))
+        return not (rates or spread_is_wide(model, kinds == INERTIAL))
     parts = [as_sparse(part) for part in model.quadratics.P]
     others = (*model.quadratics.F[1:], *model.quadratics.D)
     if not N or found.shift or any(as_sparse(part).nnz for part in others):

@@ -13,7 +13,7 @@ from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.loss_points import loss_points
 from halfdof_ctrl.reduction.method.refined_answers import StateSolver
 from support.anykinds import Kind, in_units, massless_nodes, mixed, nearly_singular, signals
-from support.beams import cantilever
+from support.beams import ball_transfer, cantilever
 from support.rational import rational_transfer
 from support.structures import assembly, gyroscopic, null_columns, rank_deficient
 from support.verdict import Improved
@@ -127,3 +127,29 @@ def test_states_are_counted_in_models_of_fifty_dofs() -> None:
     assert exact_order(mechss(M, None, K)) == 100
     M[0, 0] = 4.0
     assert exact_order(mechss(M, None, K)) == 98
+
+
+def soft_ground_chain(n: int) -> SecondOrderModel:
+    """Make a free chain but for a soft spring, each fourth node without mass, seen by acceleration and displacement."""
+    k = 1e5 * (1.0 + 0.3 * np.cos(np.arange(n)))
+    k[0] = 0.03
+    c = 0.7 + 0.1 * np.sin(np.arange(n))
+    K, C = (np.diag(part + np.append(part[1:], 0.0)) - np.diag(part[1:], 1) - np.diag(part[1:], -1) for part in (k, c))
+    M = np.diag(np.where(np.arange(n) % 4 == 2, 0.0, 1.1))
+    return mechss(M, C, K).select(inputs="F_q5", outputs=["q8_ddot", "q22_ddot", "q22"])
+
+
+def test_accelerations_of_massless_dofs_are_looked_at_among_many_states() -> None:
+    """At the slowest mode: as much is told as balls of many digits say; of those of a mass nothing is said."""
+    model = soft_ground_chain(90)
+    with pytest.warns(LostDigitsWarning, match="of q22_ddot from F_q5"):
+        reduction = exact_reduction(model)
+    loss, output = reduction.solution.evidence.loss, reduction.output
+    stored = Improved(reduction.A, reduction.B, output.X, output.direct(1))
+    s = 1j * loss.omega
+    exact = s**2 * ball_transfer(model.select("F_q5", "q22"), s)[0]
+    found = stored.exactly_at(s)[1, 0, 0]
+    assert loss.there / SIZE <= abs(found / exact - 1.0) <= loss.there * SIZE
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", LostDigitsWarning)
+        exact_reduction(model.select("F_q5", ["q8_ddot", "q22"]))
