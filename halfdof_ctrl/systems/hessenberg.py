@@ -55,6 +55,7 @@ ONE_THREAD = 2**18  #: multiplications of a product up to which OpenBLAS takes o
 SAFE_GROWTH = 2.0**125  #: growth from one state to the next up to which it is enough to look once an inner block
 ZERO_SUBDIAGONAL = 2.0**-500  #: times the largest entry of H: below it h_{k,k-1} counts as zero
 UNSAFE_CORRECTION = 1e-3  #: a correction above this part of the value calls for a solution in the original coordinates
+SMALL_CORRECTION = 1e-9  #: of the value: smaller ones are right but for what counts as nothing if y has two digits
 UNSAFE_PRODUCT = 1e-11  #: of the errors of x and y, estimated, over the value: above it, too
 RISK = 1e-11  #: bound of the relative error above which a response is corrected; it exceeds the error by some 30 times
 RISK_BY_STATE = 1.25e-12  #: the same for each of many states: the bound grows with their number, errors with its root
@@ -195,9 +196,11 @@ class _Channels:
         correction = (y * residual).sum(axis=0)
         refined = np.asarray(_real_times_complex(c[None], state)[0] + correction)
         total = np.abs(refined + direct)
-        left = _norms(residual) * _norms(c[:, None] - points * y + _real_times_complex(self.A.T, y))
-        left *= np.maximum(_norms(x) / abs(solver.beta), _norms(y) / abs(adjoint.beta))
-        unsafe = ~((np.abs(correction) <= UNSAFE_CORRECTION * total) & (left <= UNSAFE_PRODUCT * total))
+        unsafe = ~(np.abs(correction) <= UNSAFE_CORRECTION * total)
+        if not (np.abs(correction) <= SMALL_CORRECTION * total).all():
+            left = _norms(residual) * _norms(c[:, None] - points * y + _real_times_complex(self.A.T, y))
+            left *= np.maximum(_norms(x) / abs(solver.beta), _norms(y) / abs(adjoint.beta))
+            unsafe |= ~(left <= UNSAFE_PRODUCT * total)
         if unsafe.any():
             refined[unsafe] = sparse_response(self.A, b, c, points[unsafe])
             self.bound = np.inf
