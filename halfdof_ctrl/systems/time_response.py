@@ -1,8 +1,8 @@
 """Time responses of models as data: to a step, from an initial motion, to any inputs.
 
-They are computed in energy coordinates where a model has them, which keep the slow modes of stiff structures, and given
-with the states of ``mech2ss(model)``: displacements and velocities. `ExactReduction.recover` makes the motion of every
-DOF of them, those without inertia too.
+They are computed in energy coordinates where a model has them, which keep the slow modes of stiff structures, in steps
+that keep them beside fast ones (`time_steps`), and given with the states of ``mech2ss(model)``: displacements and
+velocities. `ExactReduction.recover` makes the motion of every DOF of them, those without inertia too.
 """
 
 from collections.abc import Mapping
@@ -30,6 +30,7 @@ from halfdof_ctrl.systems.state_map import StateMap
 from halfdof_ctrl.systems.state_space import system_of_map, system_of_model
 from halfdof_ctrl.systems.state_space_data import StateSpaceData
 from halfdof_ctrl.systems.step_times import relevant_poles, step_times
+from halfdof_ctrl.systems.time_steps import time_steps
 from halfdof_ctrl.systems.working_states import working_map
 
 Motion: TypeAlias = npt.ArrayLike | Mapping[str, float] | None
@@ -80,9 +81,8 @@ def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None)
     plant = _Plant.of(model)
     time = plant.times(timepts)
     m = len(model.inputs)
-    traces = [plant.history(time, np.outer(unit, np.ones(time.size))) for unit in np.eye(m)]
-    outputs, states = (np.stack(parts, axis=1) for parts in zip(*traces, strict=True))
     inputs = np.broadcast_to(np.eye(m)[:, :, None], (m, m, time.size)).copy()
+    outputs, states = plant.histories(time, inputs)
     labels = [f"From {label}" for label in control_labels(model.inputs)]
     return plant.data(time, outputs, states, inputs, "Step response", trace_labels=labels)
 
@@ -136,8 +136,8 @@ def initial_response(
     start = plant.start(displacement, velocity, 0.0)
     time = plant.times(timepts, start)
     inputs = np.zeros((len(model.inputs), time.size))
-    outputs, states = plant.history(time, inputs, start)
-    return plant.data(time, outputs, states, inputs, "Initial response")
+    outputs, states = plant.histories(time, inputs[:, None], start)
+    return plant.data(time, outputs[:, 0], states[:, 0], inputs, "Initial response")
 
 
 @np.errstate(all="ignore")  # an unstable motion grows beyond all numbers, and is refused then
@@ -193,8 +193,9 @@ def forced_response(
         msg = "timepts must be the times [s] of the inputs, not a single one."
         raise ParameterError(msg, parameter="timepts", value=timepts)
     histories = _histories(inputs, model.inputs, time.size)
-    outputs, states = plant.history(time, histories, plant.start(displacement, velocity, histories[:, 0]))
-    return plant.data(time, outputs, states, histories, "Forced response")
+    start = plant.start(displacement, velocity, histories[:, 0])
+    outputs, states = plant.histories(time, histories[:, None], start)
+    return plant.data(time, outputs[:, 0], states[:, 0], histories, "Forced response")
 
 
 def checked_times(timepts: npt.ArrayLike) -> FloatArray:
@@ -254,17 +255,29 @@ class _Plant:
         source = self.reduction if self.states is None else self.states
         return source.state({} if displacement is None else displacement, velocity, inputs)
 
-    def history(
+    def histories(
         self, time: FloatArray, inputs: FloatArray, start: FloatArray | float = 0.0
     ) -> tuple[FloatArray, FloatArray]:
-        """Return outputs (p, k) and DOF states (N, k)."""
-        relative = time - time[0]  # python-control wants a start at zero for exact steps
-        found = control.forced_response(
-            self.sys, relative, inputs, initial_state=start, return_states=True, squeeze=False
-        )
-        states = np.asarray(found.x, dtype=float).reshape(self.sys.nstates, time.size)
-        outputs = np.asarray(found.y, dtype=float).reshape(self.sys.noutputs, time.size)
-        return outputs, states if self.states is None else self.states.to_dofs(states)
+        """Return outputs (p, j, k) and DOF states (N, j, k) in j traces of inputs (m, j, k)."""
+        steps = time_steps(*StateSpaceData.of(self.sys)[:2], time)
+        x = self._by_control(time, inputs, start) if steps is None else steps.states(inputs, start)
+        outputs = np.tensordot(self.sys.C, x, 1) + np.tensordot(self.sys.D, inputs, 1)
+        return np.asarray(outputs), x if self.states is None else self.states.to_dofs(x)
+
+    def _by_control(self, time: FloatArray, inputs: FloatArray, start: FloatArray | float) -> FloatArray:
+        """Let python-control follow the states, (N, j, k)."""
+        x = np.empty((self.sys.nstates, *inputs.shape[1:]))
+        for trace in range(inputs.shape[1] if x.size else 0):
+            found = control.forced_response(
+                self.sys,
+                time - time[0],  # python-control wants a start at zero for exact steps
+                inputs[:, trace],
+                initial_state=start,
+                return_states=True,
+                squeeze=False,
+            )
+            x[:, trace] = np.asarray(found.x, dtype=float).reshape(self.sys.nstates, time.size)
+        return x
 
     def warn(self, time: FloatArray) -> None:
         """Warn where entries do not determine the motion: what lasts as long as the response, and what is faster."""
