@@ -55,7 +55,7 @@ def optimal_gain(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights
     """Solve the Riccati equation, and accept the gain only if it stabilizes and is known well enough.
 
     Up to `FEW` states it is the equation of the states of the reduction as they are stored, solved to the last digit;
-    beyond these that of the energy, where a model has energy coordinates.
+    beyond these, or where their rounding moves the gain, that of the energy, where a model has energy coordinates.
     """
     one_thread = FEW < reduction.order <= OPTIMAL_GAIN_ONE_THREAD
     with limited_threads(1) if one_thread else nullcontext():
@@ -87,7 +87,7 @@ def _best_gain(reduction: ExactReduction, cost: Cost, weights: PhysicalWeights |
             continue
         if best is None or found.error < WORTH * best.error:
             best = found
-        if few or best.error <= (OPTIMAL_GAIN_GOOD if reduction.order <= MORE else OPTIMAL_GAIN_WARNED):
+        if best.error <= (OPTIMAL_GAIN_GOOD if reduction.order <= MORE else OPTIMAL_GAIN_WARNED):
             break
     if best is None:
         raise refusal if refusal is not None else _unsolved_error(_eigenvalues(reduction.A))

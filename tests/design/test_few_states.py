@@ -13,7 +13,9 @@ from halfdof_ctrl.base.errors import InaccurateGainWarning, LostDigitsWarning, S
 from halfdof_ctrl.design.care_problem import CareProblem
 from halfdof_ctrl.design.few_states import solved_with_digits
 from halfdof_ctrl.design.starts import Solver
-from support.riccati_truth import gain_by_sign
+from halfdof_ctrl.reduction.energy.form import energy_form
+from support.beams import beam_matrices
+from support.riccati_truth import gain_by_sign, gain_of_structure
 
 DIGITS = 1e-14  # the gain has every digit but the last of its doubles
 SOLVERS: tuple[Solver, ...] = ("scipy", "slycot")
@@ -42,6 +44,31 @@ def test_cheap_actuator_at_a_weak_damper_has_the_gain_of_its_stored_equation(see
     cost, reduction = feedback.cost, feedback.reduction
     expected = gain_by_sign(reduction.A, reduction.B, cost.Q, cost.R, cost.N)
     assert_allclose(feedback.K, expected, rtol=DIGITS, atol=DIGITS * np.abs(expected).max())
+
+
+def stepped_cantilever(lengths: tuple[float, ...]) -> SecondOrderModel:
+    """Give a clamped beam of elements of these lengths with C = 0.2 M, driven at its tip."""
+    n = 2 * len(lengths)
+    M, K = np.zeros((2, n + 2, n + 2))
+    for e, h in enumerate(lengths):
+        mass, stiffness = beam_matrices(1, clamped=False)
+        size, part = np.array([1.0, h, 1.0, h]), slice(2 * e, 2 * e + 4)
+        M[part, part] += h * size[:, None] * mass * size
+        K[part, part] += size[:, None] * stiffness * size / h**3
+    return mechss(M[2:, 2:], 0.2 * M[2:, 2:], K[2:, 2:]).select(f"F_q{n - 2}", f"q{n - 2}")
+
+
+@pytest.mark.parametrize("lengths", [(1.0, 0.03, 1.0, 0.03), (1.0, 0.01, 1.0, 1.0)])
+def test_short_elements_of_a_beam_take_no_digits(lengths: tuple[float, ...]) -> None:
+    """A of displacements and velocities has lost what M, C, K in ball arithmetic know; states of the energy keep it."""
+    model = stepped_cantilever(lengths)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", LostDigitsWarning)  # of the closed loop in displacements and velocities
+        feedback = lqr(model, displacement={model.outputs[0]: 1.0}, effort={model.inputs[0]: 1.0})
+    matrices = (model.M, model.C, model.K, model.B)
+    expected = gain_of_structure(matrices, feedback.cost.Q, feedback.cost.R, feedback.S, energy_form(model).T)
+    assert_allclose(feedback.K, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+    assert feedback.gain_error < 1e-12
 
 
 def test_rounding_of_a_barely_reached_mount_is_announced_and_too_much_of_it_refused() -> None:
