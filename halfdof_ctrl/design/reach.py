@@ -3,6 +3,7 @@
 import numpy as np
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.systems.pole_bounds import bounded_poles
 
 TOLD_FROM_ZERO = 8.0 * float(np.finfo(float).eps)  #: times N and the largest singular value: smaller ones are rounding
@@ -33,8 +34,9 @@ def hidden_mode(
 ) -> tuple[ComplexArray, float] | None:
     """Return v with A v = eigenvalue v and C v not told from 0, if there is one (Hautus' test), and how small C v is.
 
-    Rows and columns of [A - eigenvalue I; C] are scaled until the sizes of their terms are one, so that a pole of a
-    weak damper, many decades faster than the mode, does not decide what is small.
+    States are balanced, so that their units do not matter, and rows and columns of [A - eigenvalue I; C] scaled until
+    the sizes of their terms are one, so that a pole of a weak damper, many decades faster than the mode, does not
+    decide what is small.
 
     Parameters
     ----------
@@ -51,13 +53,15 @@ def hidden_mode(
         Smallest singular value of the scaled matrix over the largest.
     """
     n = len(A)
+    A, units = balanced_states(A)  # scaling by the largest terms alone ends elsewhere from units far apart
+    sizes, C = sizes * units / units[:, None], C * units
     terms = np.vstack([np.maximum(np.abs(A), sizes) + abs(eigenvalue) * np.eye(n), np.abs(C)])
     rows, columns = _scales(terms)
     stack = np.vstack([A - eigenvalue * np.eye(n), C]) * rows[:, None] * columns
     _, values, right = np.linalg.svd(stack)
     if values[-1] > TOLD_FROM_ZERO * n * values[0]:
         return None
-    return np.asarray(columns * right[-1].conj()), float(values[-1] / values[0]) if values[0] else 0.0
+    return np.asarray(units * columns * right[-1].conj()), float(values[-1] / values[0]) if values[0] else 0.0
 
 
 def _scales(sizes: FloatArray) -> tuple[FloatArray, FloatArray]:
