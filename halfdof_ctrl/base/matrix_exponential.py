@@ -22,9 +22,7 @@ from halfdof_ctrl.base.double_double import Double2, added, matrix_product, two_
 
 TAYLOR_SIZE = 0.5  #: norm of Z up to which Taylor's series is summed ...
 TAYLOR_TERMS = 24  #: ... of so many terms: the next is below 2^-110
-TAYLOR_POWERS = (
-    5  #: of Z that are formed; higher ones are products of these (M. S. Paterson and L. J. Stockmeyer, 1973)
-)
+TAYLOR_POWERS = 5  #: of Z that are formed, higher ones as products (M. S. Paterson and L. J. Stockmeyer, 1973)
 
 
 def exact_step(A: FloatArray, B: FloatArray, h: float) -> tuple[Double2, Double2, Double2]:
