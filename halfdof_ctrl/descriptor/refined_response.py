@@ -7,17 +7,28 @@ y, relative errors of eps in every entry change the response by
 
     eps (|y|^T (|P_0| + |s| |P_1| + |s|^2 |P_2|) |x| + |y|^T |B| + |F| |x| + |D|).           (DATA)
 
+Where (DATA) is far above rounding of the value, as of an acceleration below all modes, whose terms F x + D cancel, or
+of a small unknown beside large ones, x needs more digits than it has. There the sum is formed in twice the working
+precision too, and what x lacks follows from its residual,
+
+    H(s) = F x + D + y^T (B - P x).
+
+Residuals are as precise as the largest entry of a row times the largest unknown, so that equations and unknowns are
+scaled first.
+
 Refinement takes several times as long as the solves, so it can be left for the columns of P x = B that ask for it.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray
 from halfdof_ctrl.base.exact_products import ExactPolynomial, as_it_is
+from halfdof_ctrl.descriptor.balancing import scaling_powers
 from halfdof_ctrl.descriptor.matrix_polynomial import MatrixPolynomial
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import ENOUGH_FOR_DATA, REFINED_ENOUGH
@@ -26,6 +37,7 @@ from halfdof_ctrl.model.weak_directions import Factors, refined_along_weak, refi
 FACTORS_HELD = 2**20  #: complex entries of factors held at a time (16 MB)
 MOST_ROUNDS = 4  #: of refinement; two are enough but where P(s) is nearly singular
 LAST_STEP = REFINED_ENOUGH**0.5  #: a correction below this part of the largest unknown is the last but for rounding
+SENSITIVE = 64.0  #: times rounding of a value, (DATA) from which x needs more digits than it has
 NO_FACTORS = Factors(lambda right: right, lambda right: right, np.zeros((0, 1)), np.zeros((0, 1)))  #: of no unknowns
 
 
@@ -86,6 +98,15 @@ class _Point:
     is_coarse: bool  #: whether the factors give not even a few digits
 
 
+class _Sensitive(NamedTuple):
+    """Columns at a point for which x lacks digits."""
+
+    place: int
+    inputs: IndexArray
+    x: ComplexArray  #: (n, len(inputs))
+    y: ComplexArray  #: (p, n)
+
+
 class ResponseEvaluator:
     """Evaluates a dense model at points, with or without refinement, all columns or some.
 
@@ -103,11 +124,15 @@ class ResponseEvaluator:
         exact_powers: tuple[int, ...] = (),
         sizes: bool = True,
     ) -> None:
+        rows, columns = _scales(P, points)
+        P, B, F = [rows * part * columns for part in P], [rows * part for part in B], [part * columns for part in F]
         self.P, self.B, self.F, self.D = (MatrixPolynomial(parts) for parts in (P, B, F, D))
         self.touched = MatrixPolynomial([0.0 * part if k in exact_powers else part for k, part in enumerate(P)])
         self.exact = ExactPolynomial([as_it_is(part) for part in P])
         self.coefficients = P
-        self.transposed: ExactPolynomial | None = None  #: made when it is needed
+        self.inputs, self.outputs = B, (F, D)
+        self.transposed: ExactPolynomial | None = None  #: made when it is needed, and so are ...
+        self.together: tuple[ExactPolynomial, ExactPolynomial] | None = None  #: ... ``[P -B]`` and ``[-F -D]``
         self.points, self.sizes = points, sizes
 
     def response(self, *, refined: bool = True, advance: Callable[[int], None] = lambda _: None) -> RefinedResponse:
@@ -143,8 +168,9 @@ class ResponseEvaluator:
                 solved = [point for point in tried if point is not None and (refined or not point.factors.is_nudged)]
                 if refined:
                     self._refine(solved)
-                for point in solved:
-                    self._finish(found, point)
+                sensitive = [self._finish(found, point) for point in solved]
+                if refined:
+                    self._sum_again(found, [part for part in sensitive if part.inputs.size])
             advance(len(chosen))
 
     def _factorized(self, place: int, inputs: IndexArray) -> _Point | None:
@@ -196,20 +222,56 @@ class ResponseEvaluator:
             self.transposed = ExactPolynomial([as_it_is(part.T) for part in self.coefficients])
         return refined_at(self.transposed, point.s, y, right, point.factors.transposed, enough=ENOUGH_FOR_DATA).solution
 
-    def _finish(self, found: RefinedResponse, point: _Point) -> None:
+    def _finish(self, found: RefinedResponse, point: _Point) -> _Sensitive:
+        """Write what is found at a point, and return the columns that need more digits."""
         s, x, inputs = point.s, point.x, point.inputs
         output = self.F.at(s)
         y = self._adjoint(point, output).T if len(x) else output
-        found.values[:, inputs, point.place] = self.F.times(s, x) + self.D.at(s)[:, inputs]
         (sx, most), (sy, _) = _sizes(x, point.factors.across), _sizes(y.T, point.factors.down)
+        values = self.F.times(s, x) + self.D.at(s)[:, inputs]
+        found.values[:, inputs, point.place] = values
         terms = self.B.size_at(s)[:, inputs] + self.touched.size_times(s, sx)
-        data = sy.T @ terms + self.F.size_times(s, sx) + self.D.size_at(s)[:, inputs]
-        found.data[:, inputs, point.place] = EPS * data
+        data = EPS * (sy.T @ terms + self.F.size_times(s, sx) + self.D.size_at(s)[:, inputs])
+        found.data[:, inputs, point.place] = data
         if self.sizes:
             change = self.B.slope_at(s)[:, inputs] - self.P.slope_times(s, x)
             moved = y @ change + self.F.slope_times(s, x) + self.D.slope_at(s)[:, inputs]
             found.slope[:, inputs, point.place] = np.abs(s * moved)
             found.natural[:, inputs, point.place] = self.F.size_times(s, most)
+        lacks = (data > SENSITIVE * EPS * np.abs(values)).any(axis=0) & bool(len(x))
+        return _Sensitive(point.place, inputs[lacks], x[:, lacks], y)
+
+    def _sum_again(self, found: RefinedResponse, left: Sequence[_Sensitive]) -> None:
+        """Write ``F x + D + y^T (B - P x)`` where x lacks digits, all points at once."""
+        if not left:
+            return
+        if self.together is None:
+            more = [np.zeros(self.B.shape)] * (len(self.coefficients) - len(self.inputs))
+            driven, (F, D) = [-part for part in self.inputs] + more, self.outputs
+            self.together = _side_by_side(self.coefficients, driven), _side_by_side([-f for f in F], [-d for d in D])
+        places = np.repeat([part.place for part in left], [part.inputs.size for part in left])
+        inputs = np.concatenate([part.inputs for part in left])
+        unknowns = np.vstack([np.hstack([part.x for part in left]), np.eye(self.D.shape[1])[:, inputs]])
+        sums, residual = (side.residual(self.points[places], unknowns) for side in self.together[::-1])
+        ends = np.cumsum([part.inputs.size for part in left])[:-1]
+        lacking = [part.y @ rest for part, rest in zip(left, np.split(residual, ends, axis=1), strict=True)]
+        found.values[:, inputs, places] = sums + np.hstack(lacking)
+
+
+def _side_by_side(one: Coefficients, other: Coefficients) -> ExactPolynomial:
+    """Return two matrix polynomials as one."""
+    return ExactPolynomial([as_it_is(np.hstack(parts)) for parts in zip(one, other, strict=True)])
+
+
+def _scales(P: Coefficients, points: ComplexArray) -> tuple[FloatArray, FloatArray]:
+    """Return powers of two for the equations (n, 1) and the unknowns (n,), at the frequency in the middle."""
+    away = np.abs(points[points != 0.0])
+    middle = float(np.exp(np.log(away).mean())) if away.size else 1.0
+    size = np.zeros(P[0].shape)
+    for power, part in enumerate(P):
+        size += middle**power * np.abs(part)
+    rows, columns = scaling_powers(size)
+    return rows[:, None], columns
 
 
 def _share(correction: ComplexArray, x: ComplexArray) -> float:

@@ -8,6 +8,9 @@ from numpy.testing import assert_allclose
 
 from halfdof_ctrl import hydromount, mechss
 from halfdof_ctrl.descriptor.refined_response import refined_response
+from support.anykinds import Kind, holonomic, in_units, mixed, signals
+from support.rational import rational_transfer
+from support.structures import passive
 
 EXACT = 4 * np.finfo(float).eps  # one solve whose solution is right to the last digit, and one product
 
@@ -69,3 +72,43 @@ def test_no_unknowns_leave_the_direct_term() -> None:
         [none, none], [np.zeros((0, 1))], [np.zeros((1, 0))], [np.array([[3.0]])], np.array([1j]), exact_powers=(1,)
     )
     assert found.values.tolist() == [[[3.0]]]
+
+
+def accelerance(s: complex) -> complex:
+    """``s^2 / (s^2 + s / 2 + 4)``, each term exact where s is a power of two times j."""
+    return s**2 / (s**2 + 0.5 * s + 4.0)
+
+
+@pytest.mark.parametrize("power", [-10, -25, -40])
+def test_an_acceleration_far_below_the_mode_keeps_its_digits(power: int) -> None:
+    """``y = -4 x_1 - x_2 / 2 + u``, whose terms cancel to 4^power: no error of the sum is one of A, B, C, D."""
+    A, B = np.array([[0.0, 1.0], [-4.0, -0.5]]), np.array([[0.0], [1.0]])
+    s = 2.0**power * 1j
+    found = refined_response([-A, np.eye(2)], [B], [A[1:]], [np.eye(1)], np.array([s]), exact_powers=(1,))
+    assert_allclose(found.values[0, 0, 0], accelerance(s), rtol=EXACT)
+
+
+@pytest.mark.parametrize("power", [-10, -25, -40])
+def test_a_stretch_under_prescribed_motion_keeps_its_digits(power: int) -> None:
+    """``q - u`` of a mass on a moving foot is ``-s^2 / (s^2 + s / 2 + 4)``; q is u but for that."""
+    model = mechss([[1]], [[0.5]], [[4]], [[4]], [[1]], D=[[-1]], Bv=[[0.5]])
+    s = 2.0**power * 1j
+    found = refined_response(*model.quadratics, np.array([s]))
+    assert_allclose(found.values[0, 0, 0], -accelerance(s), rtol=EXACT)
+
+
+@pytest.mark.parametrize("kind", [passive, holonomic, mixed])
+@pytest.mark.parametrize("seed", range(4))
+def test_values_are_right_to_the_last_digit_in_any_units(kind: Kind, seed: int) -> None:
+    """Units of DOFs, equations and time from 8^-9 to 8^9, against exact arithmetic, relative to what inputs do."""
+    generator = np.random.default_rng([seed, 7])
+    plain = signals(generator, kind(generator, 8))
+    columns, rows = 8.0 ** generator.integers(-9, 10, (2, len(plain.dofs)))
+    tau = 8.0 ** int(generator.integers(-9, 10))
+    model = in_units(plain, columns, rows, tau)
+    exact = rational_transfer(model)
+    if exact.order < 0:
+        pytest.skip("a singular pencil")
+    points = np.asarray(np.array([0.01j, 0.7j, 1.0 + 3.0j, 40j]) / tau, dtype=np.complex128)
+    found, right = refined_response(*model.quadratics, points).values, exact.at(points)
+    assert_allclose(np.abs(found - right), 0.0, atol=EXACT * np.abs(right).max())
