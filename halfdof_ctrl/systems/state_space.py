@@ -184,7 +184,8 @@ def _in_energy_states(reduction: ExactReduction, states: States) -> control.Stat
             "stiffness in other coordinates, determine it better."
         )
         give_warning(msg, CloseDecisionWarning)
-    return energy_state_space(modal_form(form) if states == "modal" else form)
+    direct = reduction.output.direct(len(reduction.model.inputs))
+    return energy_state_space(modal_form(form) if states == "modal" else form, direct)
 
 
 def system_of_map(states: StateMap) -> control.StateSpace:
@@ -202,14 +203,19 @@ def system_of_map(states: StateMap) -> control.StateSpace:
     )
 
 
-def energy_state_space(form: EnergyForm) -> control.StateSpace:
-    """Make the state space of a model in energy coordinates; what is improper in it is left out."""
+def energy_state_space(form: EnergyForm, direct: FloatArray | None = None) -> control.StateSpace:
+    """Make the state space of a model in energy coordinates; what is improper in it is left out.
+
+    D does not depend on the states. Where it is exactly zero in those of the reduction, `direct`, (p, m), it is zero
+    here, and not what rounding leaves of sums over the coordinates, which alone would be left in deep roll-off.
+    """
     model, output = form.model, form.output
+    D = output.direct(len(model.inputs))
     return labelled_system(
         form.A,
         form.B,
         output.X,
-        output.direct(len(model.inputs)),
+        D if direct is None else np.where(direct == 0.0, 0.0, D),
         states=form.states,
         inputs=model.inputs,
         outputs=model.outputs,

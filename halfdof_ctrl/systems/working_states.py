@@ -110,7 +110,7 @@ def working_system(model: SecondOrderModel) -> control.StateSpace:
     form = working_form(model, sys.nstates)
     if form is None:
         reduction.solution.evidence.warn_of_loss()
-    return sys if form is None else energy_state_space(form)
+    return sys if form is None else energy_state_space(form, np.asarray(sys.D))
 
 
 class ModelResponse(NamedTuple):

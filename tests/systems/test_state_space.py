@@ -19,6 +19,7 @@ from halfdof_ctrl.base.errors import (
     UncertainRankError,
 )
 from halfdof_ctrl.systems import state_space
+from halfdof_ctrl.systems.state_map import States
 from support import exact
 from support.comparison import POINTS, assert_same_transfer, response
 from support.structures import Structure, assembly, damped_structures, null_columns, passive, structures
@@ -202,3 +203,16 @@ def test_improper_pairs_that_the_oracle_does_not_find_are_uncertain(monkeypatch:
     monkeypatch.setattr(state_space, "pencil_structure", lambda _: Unsure())
     with pytest.raises(UncertainRankError, match=r"tip_dot from F_tip grow with frequency cannot be told.*none do"):
         mech2ss(model)
+
+
+@pytest.mark.parametrize("states", ["energy", "modal"])
+@pytest.mark.parametrize("seed", range(4))
+def test_direct_terms_that_are_zero_are_zero_in_all_states(states: States, seed: int) -> None:
+    """Accelerations of undriven masses between springs, some with half DOFs: no force acts on them at once."""
+    generator = np.random.default_rng(seed)
+    springs = np.append(10.0 ** generator.uniform(0.0, 6.0, 8), 0.0)
+    K = np.diag(springs[:-1] + springs[1:]) - np.diag(springs[1:-1], 1) - np.diag(springs[1:-1], -1)
+    M = np.diag(generator.uniform(1.0, 50.0, 8) * np.array([1, 1, 0, 1, 1, 0, 1, 1]))
+    C = np.diag(np.where(np.diagonal(M) == 0.0, generator.uniform(1.0, 50.0, 8), 0.0))
+    model = mechss(M, C, K).select(["F_q0", "F_q2"], ["q1_ddot", "q4_ddot", "q7_ddot"])
+    assert_array_equal(mech2ss(model, states=states).D, np.zeros((3, 2)))
