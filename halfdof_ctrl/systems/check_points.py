@@ -10,6 +10,7 @@ SMALL_EIGENVALUE = 1e-6  #: of the largest or the typical frequency: eigenvalues
 SURELY_AWAY = 100.0  #: times its bound: an eigenvalue beyond that is not at the origin
 EIGENVALUE_AT_ORIGIN = 1e-12  #: of the typical frequency: eigenvalues below are at the origin
 CLEARANCE = 1e-3  #: points keep this relative distance from the poles on the imaginary axis
+WIDER = 10.0  #: times the sizes of the slowest and the fastest pole, as far as points on the axis go
 GRID_POINTS = 60  #: points on the axis besides those at the poles
 FEWEST_ON_GRID = 15  #: of these in the largest models
 MOST_POLE_POINTS = 100  #: poles that get a point of their own
@@ -44,8 +45,8 @@ def check_points(moving: ComplexArray, most: int) -> ComplexArray:
     at_most = max(1, int(share * MOST_POLE_POINTS))
     chosen = moving[np.unique(np.linspace(0, moving.size - 1, min(moving.size, at_most)).astype(np.intp))]
     low, high = np.abs(moving).min(), np.abs(moving).max()
-    grid = np.geomspace(low / 10.0, high * 10.0, max(FEWEST_ON_GRID, int(share * GRID_POINTS)))
-    swinging = chosen[chosen.imag > 0.0]
+    grid = np.geomspace(low / WIDER, high * WIDER, max(FEWEST_ON_GRID, int(share * GRID_POINTS)))
+    swinging = chosen[chosen.imag >= low / WIDER]  # a slower one of a pair beside it on the real axis shows nothing
     lift = np.maximum(0.0, CLEARANCE * np.abs(swinging) - np.abs(swinging.real))
     at_poles = lift + 1j * swinging.imag
     at_sizes = 1j * np.abs(chosen)

@@ -1,11 +1,13 @@
 """What a cross-check says: errors as they are, what the numbers allow, and the verdict that follows."""
 
+import textwrap
 from dataclasses import asdict, dataclass
 
 from halfdof_ctrl.systems.judged import Grade
 
 TABLE_WIDTH = 79  #: columns of the printed table, as terminals have them
 FIGURES = 37  #: columns in front of the place of the worst error
+NO_BREAK = "\N{NO-BREAK SPACE}"
 VERDICTS = {Grade.OK: "ok", Grade.WITHIN: "within", Grade.FAILED: "FAILED"}
 CHECK_RESULT_NONE = "(none)"  #: where nothing was compared
 CHECK_RESULT_WITHIN = "ok within what the numbers allow"
@@ -71,6 +73,17 @@ class CrossCheck:
         return "ok" if self.grade == Grade.OK else "failed"
 
     @property
+    def failed(self) -> tuple[str, ...]:
+        """What failed: ``"states"``, ``"transfer"``, ``"poles"``, ``"step"``, as the rows of the table are called."""
+        grades = {
+            "states": self.count_grade,
+            "transfer": self.transfer_grade,
+            "poles": self.pole_grade,
+            "step": self.step_grade,
+        }
+        return tuple(what for what, grade in grades.items() if grade == Grade.FAILED)
+
+    @property
     def passed(self) -> bool:
         """Whether the count agrees and every error is small, or no larger than the numbers allow."""
         return self.grade != Grade.FAILED
@@ -111,25 +124,24 @@ class CrossCheck:
         return f"{finite} finite, {self.n_infinite} infinite, index {self.index}"
 
     def __repr__(self) -> str:
-        """Print as a small table, as wide as a terminal."""
-        room = TABLE_WIDTH - FIGURES
-        lines = [f"{'':10}{'error':>8}  {'allowed':>7}  {'':6}  worst at"]
-        lines += [
-            f"{what:10}{error:>8}  {allowed:>7}  {verdict or '(info)':6}  {_shortened(where, room)}".rstrip()
-            for what, error, allowed, verdict, where in self.rows
-        ]
+        """Print as a small table, as wide as a terminal; a long place goes on in the next line."""
+        lines = [f"{'':10}{'error':>8}  {'allowed':>7}  {'':6}  worst at (s, poles in rad/s)"]
+        for what, error, allowed, verdict, where in self.rows:
+            first, *more = _wrapped(where, TABLE_WIDTH - FIGURES)
+            lines.append(f"{what:10}{error:>8}  {allowed:>7}  {verdict or '(info)':6}  {first}".rstrip())
+            lines += [f"{'':{FIGURES}}{line}" for line in more]
         notes = [f"Not checked: {limit}" for limit in self.limits]
-        head = "Cross-check FAILED" if not self.passed else "Cross-check passed"
+        head = f"Cross-check FAILED: {', '.join(self.failed)}" if not self.passed else "Cross-check passed"
         return "\n".join([f"{head}: {self.verdict}" if self.grade == Grade.WITHIN else head, *lines, *notes])
 
 
-def _shortened(text: str, width: int) -> str:
-    """Leave out the middle of what is too long, where names are least telling.
+def _wrapped(text: str, width: int) -> list[str]:
+    """Break what is too long, the point of frequency or time in one piece.
 
-    >>> _shortened("a_very_long_name from another at s = 1j", 30)
-    'a_very_long_na..ther at s = 1j'
+    >>> _wrapped("a_very_long_name from another at s = -0.1 + 1j", 30)
+    ['a_very_long_name from another', 'at s = -0.1 + 1j']
     """
-    if len(text) <= width:
-        return text
-    front = (width - 2) // 2
-    return f"{text[:front]}..{text[len(text) - (width - 2 - front) :]}"
+    channel, at, point = text.rpartition(" at ")
+    held = f"{channel} at{NO_BREAK}{point.replace(' ', NO_BREAK)}" if at else text
+    lines = textwrap.wrap(held, width, break_on_hyphens=False)
+    return [line.replace(NO_BREAK, " ") for line in lines] or [""]

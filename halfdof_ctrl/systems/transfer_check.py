@@ -2,8 +2,10 @@
 
 An error is relative to the value of its channel at that point. Beside a zero or an undamped resonance a value says
 little: there the value that the channel has at a frequency 0.1 % away counts, and deep in the roll-off, where states
-have digits that the output does not show, a millionth of the channel's largest value. A channel that is zero, or zero
-but for rounding, has no value: it is measured by the sizes of its output and its input.
+have digits that the output does not show, a millionth of the channel's largest value, but no more than a hundredth of
+what the output would be at that point if all DOFs moved as the one that moves most: beside a slow drift a mode is not
+deep. A channel that is zero, or zero but for rounding, has no value: it is measured by the sizes of its output and its
+input. A weak one of which both sides hold digits has.
 
 Of many values those are refined where the two sides differ by more than a hundredth of what is good: elsewhere
 rounding of both solves agrees to that, and whatever it hides is a hundredth of an error.
@@ -26,9 +28,11 @@ from halfdof_ctrl.systems.state_space_data import StateSpaceData
 
 TRANSFER_TOLERANCE = 1e-10  #: relative to the value
 DEEP = 1e-6  #: of a channel's largest value: deeper in the roll-off, errors are relative to that
+DEEP_THERE = 1e-2  #: of what an output would be if all DOFs moved as the largest does there: no larger value is deep
 NEARBY = 1e-3  #: relative change of frequency: beside a zero the value so far away counts
 BESIDE_AXIS = 2e-3  #: points nearer to the imaginary axis, as a part of their size, are what plots show
 ROUNDING_OF_ZERO = 1024 * EPS  #: of the size of output and input, left of a channel that is zero
+DIGITS_HELD = 1e-6  #: of a value: where rounding changes no more, a weak channel is no rounding
 FEW_VALUES = 2**20  #: of all channels at all points, which are refined one and all
 DOUBTED = 1e-2 * TRANSFER_TOLERANCE  #: difference of the two sides from which, of many values, a column is refined
 
@@ -78,7 +82,7 @@ def transfer_of_both(
     few = model.D.size * points.size <= FEW_VALUES
     exact, found = (side.response(refined=few, advance=advance) for side in sides)
     if not few:
-        measure = _measured(model, exact)
+        measure = _measured(model, exact, found)
         differs = ~(np.abs(found.values - exact.values) <= DOUBTED * measure.value)
         for side, response in zip(sides, (exact, found), strict=True):
             side.refine(response, np.asarray(differs.any(axis=0)))
@@ -104,7 +108,7 @@ def compare_transfer(
     exact, found : RefinedResponse
         Of the model and of the state space.
     """
-    measure, many = _measured(model, exact), safety(len(model.dofs))
+    measure, many = _measured(model, exact, found), safety(len(model.dofs))
     doubles = np.where(np.isfinite(found.data), found.data, 0.0)
     room = np.where(measure.is_zero, ROUNDING_OF_ZERO * measure.scale, 0.0) + many * (measure.data + doubles)
     determined = np.isfinite(exact.values)
@@ -128,15 +132,22 @@ def compare_transfer(
     )
 
 
-def _measured(model: SecondOrderModel, exact: RefinedResponse) -> _Measure:
-    """Return what errors are relative to."""
+def _measured(model: SecondOrderModel, exact: RefinedResponse, found: RefinedResponse) -> _Measure:
+    """Return what errors are relative to.
+
+    A channel far below what its output and its input do elsewhere is zero but for rounding, unless the entries of the
+    model and those of the state space both hold digits of it.
+    """
     known, many = max(model.known_to / EPS, 1.0), safety(len(model.dofs))
     size, data = np.abs(exact.values), exact.data * known
     is_zero = ~(size > many * data).any(axis=2, keepdims=True)
-    is_zero |= ~(size > ROUNDING_OF_ZERO * _by_signals(np.where(is_zero, 0.0, size))).any(axis=2, keepdims=True)
+    is_held = (size * DIGITS_HELD > many * (data + found.data)).all(axis=2, keepdims=True)
+    weak = ~(size > ROUNDING_OF_ZERO * _by_signals(np.where(is_zero, 0.0, size))).any(axis=2, keepdims=True)
+    is_zero |= weak & ~is_held
     scale = _by_signals(np.where(is_zero, 0.0, size))
     scale = np.where(scale > 0.0, scale, np.nan_to_num(exact.natural).max(axis=2, keepdims=True))
     deep = DEEP * np.nan_to_num(size).max(axis=2, keepdims=True)
+    deep = np.minimum(deep, DEEP_THERE * np.nan_to_num(exact.natural, nan=np.inf))
     value = np.where(is_zero, scale, np.maximum(np.maximum(size, NEARBY * exact.slope), deep))
     value = np.where(value > 0.0, value, 1.0)  # no response at all, or none determined
     return _Measure(np.asarray(is_zero), scale, value, data)

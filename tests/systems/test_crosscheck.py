@@ -32,6 +32,7 @@ from halfdof_ctrl.base.errors import (
 )
 from halfdof_ctrl.descriptor import radau
 from halfdof_ctrl.systems import step_check, transfer_check
+from halfdof_ctrl.systems.check_points import check_points
 from halfdof_ctrl.systems.judged import Grade
 from halfdof_ctrl.systems.pole_check import compare_poles
 from halfdof_ctrl.systems.refined_poles import refined_poles
@@ -196,6 +197,31 @@ def test_delicate_systems_are_not_let_off(case: str, letter: str) -> None:
     assert not check.passed, check
 
 
+@pytest.mark.filterwarnings("ignore::halfdof_ctrl.errors.NearlyMasslessWarning")
+def test_a_mode_beside_a_slow_drift_is_not_let_off() -> None:
+    """A drift of 1e-5 rad/s is 1e12 times as large at rest as a mode of 100 rad/s at its peak: that is no roll-off."""
+    model = mechss(np.eye(2), np.diag([1e-5, 1.0]), np.diag([1e-10, 1e4]), [1, 1], [1, 1])
+    sys = mech2ss(model)
+    assert crosscheck(model, sys).verdict == "ok"
+    sys.C[0, 1] *= 1.0 + CHANGE
+    check = crosscheck(model, sys)
+    assert "transfer" in check.failed
+    assert 1e-9 < check.max_transfer_error < 1e-5
+
+
+@pytest.mark.parametrize("change", [CHANGE, 1.0])
+def test_a_weak_coupling_is_checked_by_its_own_value(change: float) -> None:
+    """A spring of 1e-14 between two oscillators: its channel is no rounding where both sides hold its digits."""
+    model = mechss(np.eye(2), 0.1 * np.eye(2), [[1.0, -1e-14], [-1e-14, 2.0]])
+    sys = mech2ss(model)
+    assert crosscheck(model, sys).verdict == "ok"
+    sys.A[3, 0] *= 1.0 + change
+    check = crosscheck(model, sys)
+    assert check.failed == ("transfer", "step")
+    assert check.transfer_worst.startswith("q1 from F_q0 at s = ")
+    assert_allclose(check.max_transfer_error, change, rtol=1e-6)
+
+
 def test_wrong_order_fails_and_is_told() -> None:
     """A system with a state too many, or too few, has another count of poles."""
     model = mount("mass")
@@ -219,9 +245,24 @@ def test_verdict_prints_as_a_table() -> None:
     lines = text.splitlines()
     assert lines[0] == "Cross-check passed"
     what = ["states", "transfer", "poles", "step", "data", "doubles", "sys(s)", "ct.step", "slycot"]
-    assert [line.split()[0] for line in lines[2:]] == what
+    assert [line.split()[0] for line in lines[2:] if not line.startswith(" ")] == what
     assert "4 finite, 2 infinite" in text
     assert max(map(len, lines)) < 80
+
+
+def test_a_failure_says_what_failed_where_in_full() -> None:
+    """Long names are not cut: output, input and frequency of the worst error can all be read."""
+    names = ["displacement_of_the_left_engine_mount", "displacement_of_the_right_engine_mount"]
+    model = mechss(np.eye(2), 0.1 * np.eye(2), [[3.0, -1.0], [-1.0, 2.0]], dofs=names).select(f"F_{names[0]}", names[1])
+    sys = mech2ss(model)
+    sys.C[0, 1] *= 1.0 + 1e-6
+    check = crosscheck(model, sys)
+    text = repr(check)
+    assert check.failed == ("transfer", "step")
+    assert text.splitlines()[0] == "Cross-check FAILED: transfer, step"
+    assert check.transfer_worst.startswith(f"{names[1]} from F_{names[0]} at s = ")
+    assert check.transfer_worst in " ".join(text.split())
+    assert max(map(len, text.splitlines())) < 80
 
 
 def test_worst_place_is_named() -> None:
@@ -344,6 +385,13 @@ def test_eigenvalues_that_rounding_moves_raise_no_alarm(problem: Callable[[], Se
     improper = {int(i) for part in exact_reduction(model).polynomial_part for i in np.flatnonzero(part.any(axis=1))}
     model = model.select(outputs=[name for i, name in enumerate(model.outputs) if i not in improper])
     assert crosscheck(model, mech2ss(model)).passed
+
+
+def test_a_pair_that_hardly_swings_asks_for_no_point_of_its_own() -> None:
+    """``-1 +- 1e-30j``, a double pole as rounding splits it: the slowest point lies a decade below the pole."""
+    points = check_points(np.array([-1.0 + 1e-30j, -1.0 - 1e-30j, -0.01 + 5j, -0.01 - 5j]), 1000)
+    assert_allclose(np.abs(points).min(), 0.1)
+    assert np.any(points == 5j)
 
 
 @pytest.mark.parametrize("change", [1e-6, -1e-6])
