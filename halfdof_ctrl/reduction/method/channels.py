@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from halfdof_ctrl.base.arrays import EPS, FloatArray, IndexArray, Matrix, as_dense
+from halfdof_ctrl.base.sparse_arrays import filled_rows
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.loss_points import Slow
 from halfdof_ctrl.reduction.method.refined_answers import Response
@@ -39,9 +40,13 @@ def is_looked_at(omega: FloatArray, value: FloatArray, slow: Slow, kinds: FloatA
     """
     at_rest = (omega < slow.least)[:, None, None]
     looked_at = is_gentle(omega, value) & ~at_rest
-    seen = (omega[:-1, None, None] / slow.least) ** kinds > NEAR_REST if slow.least > 0.0 else np.zeros((1, 1, 1))
-    rates = np.where(seen, kinds, 0.0)
-    looked_at[:-1] |= at_rest[:-1] & (_changes(value) < STAYS * (omega[1:] / omega[:-1])[:, None, None] ** rates)
+    rates = np.zeros((omega.size, 1, 1))
+    if slow.least > 0.0:
+        rates = np.where((omega[:, None, None] / slow.least) ** kinds > NEAR_REST, kinds, 0.0)
+    changes, ratio = _changes(value), (omega[1:] / omega[:-1])[:, None, None]
+    looked_at[:-1] |= at_rest[:-1] & (changes < STAYS * ratio ** rates[:-1])
+    falls = rates[1:] > 0.0  # from the point below, since above there may be a resonance
+    looked_at[1:] |= at_rest[1:] & falls & (changes < STAYS * ratio ** rates[1:])
     looked_at[omega >= slow.typical] = True
     return looked_at
 
@@ -49,15 +54,20 @@ def is_looked_at(omega: FloatArray, value: FloatArray, slow: Slow, kinds: FloatA
 def least_powers(model: SecondOrderModel, chosen: IndexArray) -> FloatArray:
     """Return by which power of s channels fall towards rest at least, by their signals: 1 for a velocity."""
     _, inputs, outputs, direct = model.quadratics
-    into, seen, through = (
-        np.min([np.where(_is_there(part, axis), float(k), STEEP_RISE) for k, part in enumerate(parts)], axis=0)
-        for parts, axis in ((columns_of(inputs, chosen), 0), (outputs, 1), (columns_of(direct, chosen), ()))
-    )
+    into = _least([np.any(part != 0.0, axis=0) for part in columns_of(inputs, chosen)])
+    seen = _least([np.array(filled_rows([part])) for part in outputs])
+    through = _least([part != 0.0 for part in columns_of(direct, chosen)])
     return np.asarray(np.minimum(seen[:, None] + into, through))
 
 
-def _is_there(part: Matrix, axis: int | tuple[()]) -> npt.NDArray[np.bool_]:
-    return np.asarray((as_dense(part) != 0.0).any(axis=axis))
+def falls_towards_rest(model: SecondOrderModel, chosen: IndexArray) -> bool:
+    """Return whether a channel is a velocity, an acceleration or what a derivative of an input does."""
+    return bool((least_powers(model, chosen) > 0.0).any())
+
+
+def _least(is_there: Sequence[npt.NDArray[np.bool_]]) -> FloatArray:
+    """Return the first of powers 0, 1, 2 of which there is something."""
+    return np.asarray(np.min([np.where(part, float(k), STEEP_RISE) for k, part in enumerate(is_there)], axis=0))
 
 
 def is_gentle(omega: FloatArray, value: FloatArray) -> npt.NDArray[np.bool_]:

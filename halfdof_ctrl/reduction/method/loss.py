@@ -35,6 +35,7 @@ from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.method.channels import (
     columns_of,
+    falls_towards_rest,
     is_gentle,
     is_looked_at,
     least_powers,
@@ -47,6 +48,7 @@ from halfdof_ctrl.reduction.method.loss_points import (
     NOTHING_SLOW,
     Slow,
     loss_points,
+    one_below,
     points_of_few,
     signal_speeds,
     typical_speeds,
@@ -221,6 +223,8 @@ class _Comparison:
         chosen = looked_at(m, MOST_INPUTS)
         few = len(model.dofs) <= FEW_DOFS
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
+        if points.size and falls_towards_rest(model, chosen):
+            points = np.append(points, one_below(points))
         points = points[np.argsort(np.abs(points))]
         speeds = typical_speeds(model) if few else [float(np.median(np.abs(points))) if N else 1.0]
         speed = speeds[-1]

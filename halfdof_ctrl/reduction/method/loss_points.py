@@ -62,6 +62,14 @@ def beside_modes(moving: ComplexArray) -> ComplexArray:
     return np.asarray(1j * BESIDE_MODE * (chosen if chosen.size else np.ones(1)))
 
 
+def one_below(points: ComplexArray) -> ComplexArray:
+    """Return, for channels that fall towards rest, as accelerations do, and their digits with them, a point below all.
+
+    A decade below the slowest oscillation, which comes first, responses begin to be looked at.
+    """
+    return np.asarray(BELOW_ALL * points[:1])
+
+
 def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     """Return all eigenvalues of a small matrix or the smallest ones, and up to which size they may be zero."""
     N = len(A)

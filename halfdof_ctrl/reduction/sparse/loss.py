@@ -25,7 +25,7 @@ from halfdof_ctrl.base.spectrum import balanced_states
 from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.algebra.scaling import Scaling, max_scaling
 from halfdof_ctrl.reduction.algebra.sparse_lu import is_nearly_symmetric
-from halfdof_ctrl.reduction.method.channels import SMALL_CHANNEL, ZERO_CHANNEL, rounding_of_channels
+from halfdof_ctrl.reduction.method.channels import SMALL_CHANNEL, ZERO_CHANNEL, falls_towards_rest, rounding_of_channels
 from halfdof_ctrl.reduction.method.loss import (
     MOST_INPUTS,
     UNSETTLED,
@@ -42,6 +42,7 @@ from halfdof_ctrl.reduction.method.loss_points import (
     SLOW_MODES_ACCURACY,
     beside_modes,
     loss_points,
+    one_below,
 )
 from halfdof_ctrl.reduction.method.masses import own_speeds
 from halfdof_ctrl.reduction.method.refined_answers import (
@@ -99,7 +100,7 @@ def measured_sparsely(stored: SparselyStored) -> Measurement:
     first = _mixture(stored.B) if large else _picked(chosen, m)
     ground = _Ground.of(stored, model, by_W=by_W)
     comparison = ground.driven_by(first)
-    points = comparison.points()
+    points = comparison.points(below=falls_towards_rest(model, chosen))
     if large or filled > FILLED:
         points = points[: 1 if by_W else POINTS_OF_LARGE]
     if large:
@@ -203,20 +204,23 @@ class _Comparison:
     balance: FloatArray  #: (N,) what the balanced states are multiplied by
     inputs: FloatArray  #: (m, k) the inputs that the columns stand for
 
-    def points(self) -> ComplexArray:
-        """Choose points, those first that tell most: beside the slowest modes, and up to where masses swing alone."""
+    def points(self, *, below: bool) -> ComplexArray:
+        """Choose points, those first that tell most: beside the slowest modes, and up to where masses swing alone.
+
+        If channels fall towards rest, below all modes too.
+        """
         A, speeds = self.stored.A, own_speeds(self.stored.model)
-        if self.by_W or len(A) <= ALL_EIGENVALUES:
-            return loss_points(A)
-        slow = beside_modes(self._slow_modes(speeds))
-        if not (speeds > 0.0).any():
-            return slow
+        few = self.by_W or len(A) <= ALL_EIGENVALUES
+        slow = loss_points(A) if few else beside_modes(self._slow_modes(speeds))
+        under = one_below(slow) if below else slow[:0]
+        if few or not (speeds > 0.0).any():
+            return np.append(slow, under)
         least, typical = np.sqrt(np.quantile(speeds[speeds > 0.0], (0.0, 0.5)))
         between: Any = (
             np.geomspace(np.abs(slow).min(), typical, POINTS_BETWEEN + 2)[1:-1] if np.abs(slow).min() < typical else []
         )
         return np.concatenate(
-            [slow[:1], slow[1:][-1:], 1j * BESIDE_MODE * np.array([typical, *between, least]), slow[1:-1]]
+            [slow[:1], slow[1:][-1:], 1j * BESIDE_MODE * np.array([typical, *between, least]), slow[1:-1], under]
         )
 
     def _slow_modes(self, speeds: FloatArray) -> ComplexArray:

@@ -12,10 +12,10 @@ from halfdof_ctrl.model.second_order import SecondOrderModel
 from halfdof_ctrl.reduction.method.exact_order import exact_order
 from halfdof_ctrl.reduction.method.loss_points import loss_points
 from halfdof_ctrl.reduction.method.refined_answers import StateSolver
-from support.anykinds import Kind, in_units, massless_nodes, mixed, nearly_singular, signals
-from support.beams import ball_transfer, cantilever
+from support.anykinds import Kind, chain, in_units, massless_nodes, mixed, nearly_singular, signals
+from support.beams import ball_transfer, beam_matrices, cantilever
 from support.rational import rational_transfer
-from support.structures import assembly, gyroscopic, null_columns, rank_deficient
+from support.structures import assembly, gyroscopic, null_columns, passive, rank_deficient
 from support.verdict import Improved
 
 SIZE = 1.5  # what is lost is measured to a digit
@@ -28,6 +28,9 @@ LOSING: tuple[tuple[Kind, int, int], ...] = (  # kinds, sizes and seeds of `hunt
     (mixed, 2, 207),
     (mixed, 4, 31),
     (mixed, 5, 143),
+    (null_columns, 4, 92002978),  # a derivative of an input far below the only mode
+    (passive, 7, 92002912),  # free motions drift up to where the model works
+    (chain, 2, 92002476),
 )
 
 
@@ -100,6 +103,24 @@ def test_a_beam_loses_no_more_than_its_entries_leave_open() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", LostDigitsWarning)
         exact_reduction(cantilever(20))
+
+
+@pytest.mark.parametrize("elements", [8, 40])
+def test_accelerations_are_looked_at_below_all_modes(elements: int) -> None:
+    """That of the rotation of a lumped beam's tip, which has no mass: as s^2 of its displacement falls, digits go."""
+    M, K = beam_matrices(elements)
+    lumped = np.diag(np.tile([1.0 / elements, 0.0], elements))
+    tip, n = 2 * elements - 2, len(M)
+    model = mechss(lumped, 1e-5 * K, K, np.eye(n)[:, [tip]], F=None, H=np.eye(n)[[tip + 1]])
+    with pytest.warns(LostDigitsWarning, match="lose"):
+        reduction = exact_reduction(model)
+    loss, output = reduction.solution.evidence.loss, reduction.output
+    slowest = np.abs(np.linalg.eigvals(reduction.A)).min()
+    assert 0.05 * slowest < loss.omega < 0.2 * slowest
+    s = 1j * loss.omega
+    exact = s**2 * ball_transfer(mechss(lumped, 1e-5 * K, K).select(f"F_q{tip}", f"q{tip + 1}"), s)[0]
+    stored = Improved(reduction.A, reduction.B, output.X, output.direct(1), output.U[1:])
+    assert_allclose(loss.there, abs(stored.exactly_at(s)[0, 0, 0] / exact - 1.0), rtol=SIZE - 1.0)
 
 
 def test_states_that_rank_decisions_hide_are_told() -> None:
