@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 import numpy as np
-from scipy.linalg.lapack import zgetrf, zgetrs
+from scipy.linalg.lapack import zgesv, zgetrf, zgetrs
 from scipy.sparse import csc_array, diags_array, eye_array, hstack
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, Matrix, as_dense, powers_of_two
@@ -27,6 +27,9 @@ STUCK_ABOVE = 1e-24  #: ... as long as it is more than that of the unknowns: els
 CERTAIN_DIGITS = 1e-4  #: of a solution: where its first correction is smaller, the rounding of residuals is nothing
 NOISE_DEVIATION = 10.0  #: times what rounding of residuals at random does in an output, which may be more
 SETTLED_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
+FACTORIZED_AGAIN = (
+    12  #: unknowns up to which that is nothing beside threads that zgetrs starts, which wait on a busy machine
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
@@ -192,7 +195,7 @@ class StateSolver:
         N = len(A)
         self.k = k = _derivatives(self.matrix)
         self.rates = np.diagonal(self.matrix[:k, N - k :])[:, None].copy()
-        self.parts: list[tuple[complex, ComplexArray, tuple[Any, ...]]] = []
+        self.parts: list[tuple[complex, ComplexArray, Solver]] = []
         for s in self.points.tolist() if N else []:
             lower = s * np.eye(N)[k:] - self.matrix[k:]
             onto = lower[:, N - k :] / self.rates.T
@@ -209,9 +212,9 @@ class StateSolver:
         if not self.parts:
             return right
         pieces = []
-        for (s, onto, factors), part in zip(self.parts, np.hsplit(right, len(self.parts)), strict=True):
+        for (s, onto, inner), part in zip(self.parts, np.hsplit(right, len(self.parts)), strict=True):
             upper, k = part[: self.k], self.k
-            first = zgetrs(*factors, part[k:] + onto @ upper)[0]
+            first = inner(part[k:] + onto @ upper)
             pieces += [np.concatenate([first, (s * first[:k] - upper) / self.rates])]
         return np.hstack(pieces)
 
@@ -225,11 +228,11 @@ def pencil_solver(P: Sequence[Matrix], points: ComplexArray) -> Solver:
         A point is an eigenvalue.
     """
     dense = [as_dense(part) for part in P]
-    factors = [factorized(np.asarray(sum(s**k * part for k, part in enumerate(dense)))) for s in points.tolist()]
+    solvers = [factorized(np.asarray(sum(s**k * part for k, part in enumerate(dense)))) for s in points.tolist()]
 
     def solve(right: ComplexArray) -> ComplexArray:
-        parts = np.hsplit(right, len(factors))
-        return np.hstack([zgetrs(*each, part)[0] for each, part in zip(factors, parts, strict=True)])
+        parts = np.hsplit(right, len(solvers))
+        return np.hstack([inner(part) for inner, part in zip(solvers, parts, strict=True)])
 
     return solve
 
@@ -253,8 +256,8 @@ def scaled_pencil_solver(model: SecondOrderModel, points: ComplexArray) -> Solve
     return solve
 
 
-def factorized(matrix: ComplexArray) -> tuple[Any, ...]:
-    """Return the factors of a complex matrix.
+def factorized(matrix: ComplexArray) -> Solver:
+    """Factorize a complex matrix and return what solves with it.
 
     Raises
     ------
@@ -265,7 +268,9 @@ def factorized(matrix: ComplexArray) -> tuple[Any, ...]:
     if not np.abs(np.diag(factors)).min() > 0.0:
         msg = "s is an eigenvalue"
         raise np.linalg.LinAlgError(msg)
-    return factors, pivots
+    if len(matrix) <= FACTORIZED_AGAIN:
+        return lambda right: np.asarray(zgesv(matrix, right)[2])
+    return lambda right: np.asarray(zgetrs(factors, pivots, right)[0])
 
 
 def _derivatives(A: FloatArray) -> int:
