@@ -3,6 +3,9 @@
 Arrays of Python integers (numpy dtype object) carry a denominator beside them where they need one. The solve is
 fraction-free elimination: every number in it is a minor of the matrix, so it stays as short as the answer is
 (E. H. Bareiss, Sylvester's identity and multistep integer-preserving Gaussian elimination, 1968).
+
+Ranks are those of remainders by a prime. Since numbers are few digits times powers of two, as units are that round
+nothing, these must not be alike: 2 is a primitive root of the prime. By 2^31 - 1 the remainder of 2^31 is 1.
 """
 
 import math
@@ -16,7 +19,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
-PRIME = 2**31 - 1  #: so that products of remainders are no larger than 64-bit integers
+PRIME = 1_915_823_501  #: so that products of remainders fit in 64 bits; all smaller powers of two differ, see below
 ANY_POINT = 1_322_336_119  #: a remainder at which nothing happens but by chance
 UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
 PENCIL_REMAINDERS = (1_234_567_891, 987_654_321, 19_937)  #: at which a companion pencil is inverted, the first that can

@@ -3,6 +3,7 @@
 import math
 from fractions import Fraction
 
+import flint
 import numpy as np
 import pytest
 from hypothesis import given
@@ -10,8 +11,13 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from halfdof_ctrl.reduction.algebra.integers import (
+    PRIME,
     as_floats,
     as_integers,
+    degree_of_determinant,
+    independent_of,
+    is_regular,
+    least_rank,
     log_determinant,
     solved_exactly,
     without_common_factor,
@@ -56,3 +62,20 @@ def test_common_factor_is_divided_out() -> None:
     numerators, denominator = without_common_factor(np.array([6, 9], dtype=object), 12)
     assert (numerators.tolist(), denominator) == ([2, 3], 4)
     assert without_common_factor(numerators, denominator)[0] is numerators
+
+
+@pytest.mark.parametrize("power", range(1, 200))
+def test_powers_of_two_are_told_from_one_and_from_each_other(power: int) -> None:
+    """Units that round nothing make such numbers: no rank may depend on them."""
+    matrix = np.array([[1.0, 1.0], [1.0, 2.0**power]])
+    assert least_rank(matrix) == 2
+    assert independent_of(as_integers(matrix)[0], range(2)) == [0, 1]
+    assert is_regular(np.stack([matrix, 0 * matrix, 0 * matrix]))
+    assert degree_of_determinant(np.stack([np.eye(2), np.zeros((2, 2)), matrix])) == 4
+
+
+def test_two_is_a_primitive_root_of_the_prime() -> None:
+    """Its powers have every remainder but zero before they come again."""
+    factors = flint.fmpz(PRIME - 1).factor()
+    assert flint.fmpz(PRIME).is_prime()
+    assert all(pow(2, (PRIME - 1) // int(factor), PRIME) != 1 for factor, _ in factors)
