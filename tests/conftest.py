@@ -1,11 +1,14 @@
 """Surroundings of all tests: hypothesis profiles, no figures left, and a way to run everything without slycot.
 
 ``HYPOTHESIS_PROFILE=wide`` runs 1000 random examples a property instead of 50; both are derandomized, so a
-failure can be repeated. ``HALFDOF_WITHOUT_SLYCOT=1`` makes slycot unimportable before control is imported.
+failure can be repeated. ``HALFDOF_WITHOUT_SLYCOT=1`` makes slycot unimportable before control is imported. Ctrl-C
+arrives as on a terminal wherever the suite runs.
 """
 
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -18,6 +21,9 @@ if os.environ.get("HALFDOF_WITHOUT_SLYCOT", "0") not in {"", "0"}:
         msg = "control or slycot was imported before tests/conftest.py could block slycot."
         raise RuntimeError(msg)
     sys.modules["slycot"] = None  # type: ignore[assignment]  # an import of it fails from now on
+
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN and threading.current_thread() is threading.main_thread():
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that runs the suite in the background takes it
 
 SLOW_DATA = [HealthCheck.too_slow, HealthCheck.data_too_large]  # a drawn model has some hundred entries
 

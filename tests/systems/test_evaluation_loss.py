@@ -18,7 +18,8 @@ from support.slycot_marks import needs_slycot
 SIZE = 30.0  # a measured loss is right to this factor: another frequency nearby loses another part of it
 
 
-@pytest.mark.parametrize("elements", [pytest.param(40, marks=needs_slycot), 80])
+@needs_slycot  # the solve of NumPy, which takes its place, loses less
+@pytest.mark.parametrize("elements", [40, 80])
 def test_beams_are_warned_of_and_the_cure_is_named(elements: int) -> None:
     """A cantilever in DOF states: the frequency, the size and `states="scaled"`, which warns of nothing."""
     with pytest.warns(LostDigitsWarning, match=r'python-control\'s evaluation of them .* states="scaled"'):
@@ -29,7 +30,7 @@ def test_beams_are_warned_of_and_the_cure_is_named(elements: int) -> None:
 
 def test_the_loss_is_that_of_python_control() -> None:
     """Measured at one frequency, against refined solves there."""
-    sys = system_of_model(cantilever(80))
+    sys = system_of_model(cantilever(120))
     loss = evaluation_loss(sys)
     assert loss is not None
     point = np.array([1j * loss.omega])
