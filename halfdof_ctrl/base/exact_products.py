@@ -9,20 +9,19 @@ multiplied as usual. `numpy.longdouble` would not do, which is a double on Windo
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.sparse import csc_array
 
 from halfdof_ctrl.base.arrays import ComplexArray, FloatArray, Matrix, powers_of_two
-from halfdof_ctrl.base.double_double import BITS, SPLITTER
+from halfdof_ctrl.base.double_double import BITS, Double2, two_product, two_sum
 from halfdof_ctrl.base.sparse_arrays import as_sparse, is_sparse
 
 SPARSE_SHARE = 0.1  #: a matrix with a smaller share of entries is multiplied as a sparse one
 SMALL_MATRIX = 2500  #: entries of a matrix that is multiplied as it is
 ROWS_TOGETHER = 4096  #: of long vectors that are multiplied: what is worked with stays near the processor
-Pair: TypeAlias = tuple[FloatArray, FloatArray]  #: a number as the sum of a double and its error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -109,7 +108,7 @@ class ExactPolynomial:
         total = _Sum(_side_by_side(np.broadcast_to(np.asarray(right, dtype=np.complex128), (self.rows, columns))))
         points = np.broadcast_to(np.asarray(s, dtype=np.complex128), x.shape[1:])
         first = _side_by_side(x)
-        powers: list[Pair] = [(first, np.zeros_like(first))]
+        powers: list[Double2] = [(first, np.zeros_like(first))]
         for (power, unit, matrix), leading in zip(self.parts, self.leading, strict=True):
             while len(powers) <= power:
                 powers.append(_times(powers[-1], points))
@@ -138,7 +137,7 @@ def _turned(parts: FloatArray) -> FloatArray:
     return np.hstack([-parts[:, columns:], parts[:, :columns]])
 
 
-def _times(vector: Pair, s: ComplexArray) -> Pair:
+def _times(vector: Double2, s: ComplexArray) -> Double2:
     """Return complex numbers with errors, real and imaginary parts side by side, each column times its point."""
     if len(vector[0]) > ROWS_TOGETHER:
         starts = range(0, len(vector[0]), ROWS_TOGETHER)
@@ -169,32 +168,12 @@ def as_it_is(matrix: FloatArray) -> Matrix:
     return csc_array(matrix) if few else matrix
 
 
-def two_sum(a: FloatArray, b: FloatArray) -> Pair:
-    """Return the rounded sum and its error."""
-    total = a + b
-    part = total - a
-    return total, (a - (total - part)) + (b - part)
-
-
-def two_product(a: FloatArray, b: FloatArray) -> Pair:
-    """Return the rounded product and its error, for numbers whose product neither overflows nor vanishes."""
-    value = a * b
-    (a_high, a_low), (b_high, b_low) = _halves(a), _halves(b)
-    return value, ((a_high * b_high - value) + a_high * b_low + a_low * b_high) + a_low * b_low
-
-
-def _halves(a: FloatArray) -> Pair:
-    scaled = SPLITTER * a
-    high = scaled - (scaled - a)
-    return high, a - high
-
-
-def _scaled(pair: Pair, factor: FloatArray) -> Pair:
+def _scaled(pair: Double2, factor: FloatArray) -> Double2:
     high, error = two_product(pair[0], factor)
     return high, error + pair[1] * factor
 
 
-def _added(a: Pair, b: Pair) -> Pair:
+def _added(a: Double2, b: Double2) -> Double2:
     high, error = two_sum(a[0], b[0])
     return high, error + (a[1] + b[1])
 

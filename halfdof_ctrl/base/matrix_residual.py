@@ -5,7 +5,8 @@ import numpy.typing as npt
 from scipy.sparse import csc_array, csr_array
 
 from halfdof_ctrl.base.arrays import FloatArray
-from halfdof_ctrl.base.exact_products import SlicedMatrix, two_sum
+from halfdof_ctrl.base.double_double import two_sum
+from halfdof_ctrl.base.exact_products import SlicedMatrix
 from halfdof_ctrl.base.sparse_arrays import is_sparse
 
 COLUMNS_TOGETHER = 32  #: of a right-hand side that a sparse matrix multiplies: their sums stay near the processor

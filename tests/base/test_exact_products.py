@@ -12,7 +12,8 @@ from scipy.sparse import csc_array
 
 from halfdof_ctrl.base import exact_products
 from halfdof_ctrl.base.arrays import Matrix
-from halfdof_ctrl.base.exact_products import ExactPolynomial, two_product, two_sum
+from halfdof_ctrl.base.double_double import two_product, two_sum
+from halfdof_ctrl.base.exact_products import ExactPolynomial
 
 LAST_DIGIT = 2.0**-52  #: of the residual itself, which is rounded once
 TWICE = 2.0**-95  #: of the largest entries of row and vector: what twice the working precision leaves

@@ -19,7 +19,7 @@ from halfdof_ctrl.base.arrays import FloatArray
 
 IntegerArray: TypeAlias = npt.NDArray[np.object_]
 
-PRIME = 1_915_823_501  #: so that products of remainders fit in 64 bits; all smaller powers of two differ, see below
+PRIME = 1_915_823_501  #: so that products of remainders fit in 64 bits; all smaller powers of two differ, see above
 ANY_POINT = 1_322_336_119  #: a remainder at which nothing happens but by chance
 UNROUNDED_BITS = 51  #: of a number that was not rounded, at most: the last two of a double are zero
 PENCIL_REMAINDERS = (1_234_567_891, 987_654_321, 19_937)  #: at which a companion pencil is inverted, the first that can

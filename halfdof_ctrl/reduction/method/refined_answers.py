@@ -27,9 +27,7 @@ STUCK_ABOVE = 1e-24  #: ... as long as it is more than that of the unknowns: els
 CERTAIN_DIGITS = 1e-4  #: of a solution: where its first correction is smaller, the rounding of residuals is nothing
 NOISE_DEVIATION = 10.0  #: times what rounding of residuals at random does in an output, which may be more
 SETTLED_DIGIT = 2.0**-96  #: of the largest product in a sum: what sums of twice the working precision have
-FACTORIZED_AGAIN = (
-    12  #: unknowns up to which that is nothing beside threads that zgetrs starts, which wait on a busy machine
-)
+FACTORIZED_AGAIN = 12  #: unknowns up to which that costs less than the threads that zgetrs starts on a busy machine
 
 
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
