@@ -116,8 +116,10 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
     points = POINTS / tau
     also = polynomial_at(stored.polynomial, points, stored.D.shape)
     value = exact.at(points)
-    size = also if value.any() else stored.balanced().terms_at(points)  # of nothing at all, any error is all
-    finding.errors["stored"] = float(transfer_errors(stored.exactly_at(points), value, size).max())
+    found, zero = stored.exactly_at(points), ~value.any(axis=2, keepdims=True)
+    shown = transfer_errors(np.where(zero, 0.0, found), value, also)
+    of_terms = np.where(zero, np.abs(found) / stored.balanced().terms_at(points), 0.0)  # of nothing, any error is all
+    finding.errors["stored"] = float(max(shown.max(), np.nan_to_num(of_terms).max()))
     if "LostDigitsWarning" not in finding.said and finding.errors["stored"] > SILENT:
         finding.complaints.append(f"error {finding.errors['stored']:.1e} in silence, measured {loss.value:.1e}")
     if not told:  # free motions and python-control's evaluation are told by another size
