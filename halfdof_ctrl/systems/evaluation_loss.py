@@ -4,24 +4,29 @@
 balancing. Where states are of very different sizes, as displacements and velocities of stiff structures are, that mixes
 large into small: a beam of forty elements loses a hundredth at its first resonance, though A, B, C, D hold all digits.
 There is no cheap predictor of the loss but one of its absence: by how much balancing A changes it. Where that is much,
-the evaluation is done at the frequencies where a loss shows and compared with refined solves.
+the evaluation is done at the frequencies where a loss shows and compared with refined solves. Of many states it takes
+longer than the reduction: there the loss is estimated at one frequency.
 """
 
 from dataclasses import dataclass
 
 import control
 import numpy as np
-from scipy.linalg.lapack import dgebal
+from control.exception import slycot_check
+from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
 
-from halfdof_ctrl.base.arrays import ComplexArray, FloatArray
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
-from halfdof_ctrl.base.spectrum import balanced
+from halfdof_ctrl.base.spectrum import balanced, balanced_states
 from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE, loss_points
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
 UNEVEN = 1e4  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
-EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, that takes longer than the reduction
+EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, it is estimated
+HESSENBERG_ROUNDING = (
+    EPS / 3.0
+)  #: of the norm of A, times 1/n: what an entry changes (in 83 responses: 0.03 to 6 of it)
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
 FASTER_POINTS = 6  #: frequencies besides the slowest ones, over all others: what is lost may show at any mode
 BESIDE_ORIGIN = 1.01  #: times the largest pole that stands for one at the origin: frequencies up to there are not tried
@@ -41,6 +46,7 @@ class EvaluationLoss:
     omega: float  #: [rad/s]
     output: int
     source: int
+    estimated: bool = False  #: and not measured
 
 
 def warn_of_evaluation(sys: control.StateSpace, states: str, at_origin: int) -> None:
@@ -64,7 +70,7 @@ def warn_of_evaluation(sys: control.StateSpace, states: str, at_origin: int) -> 
         return
     msg = (
         f"A, B, C and D are right, but python-control's evaluation of them (sys(s), control.bode_plot, "
-        f"control.frequency_response) will lose {loss.value:.1e} of {sys.output_labels[loss.output]} from "
+        f"control.frequency_response) will lose {_part_in_words(loss)} of {sys.output_labels[loss.output]} from "
         f"{sys.input_labels[loss.source]} at {loss.omega:.3g} rad/s: it does not balance states of different sizes. "
         f"{CURES.get(states, 'The digits are kept by')} halfdof_ctrl.frequency_response."
     )
@@ -78,13 +84,18 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     the value is smaller. So many of the slowest poles of A are zeros that rounding has moved: nobody looks there.
     """
     A = np.asarray(sys.A, dtype=float)
-    if len(A) > EVALUATION_LOSS_MOST_STATES or not _is_uneven(A):
+    if not _is_uneven(A):
         return None
     points = _points(A, at_origin)
     if points.size == 0:
         return None
+    estimated = len(A) > EVALUATION_LOSS_MOST_STATES and slycot_check()  # without it control solves once, as we do here
+    points = points[:1] if estimated else points
     right = system_response(sys, points)
-    found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
+    if estimated:
+        found = right.values + np.minimum(_hessenberg_rounding(sys, points[0]), np.abs(right.values))
+    else:
+        found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
     size = np.nan_to_num(np.abs(right.values))
     seen = (size > EVALUATION_LOSS_ZERO_CHANNEL * np.nan_to_num(right.data, nan=np.inf)).any(axis=2, keepdims=True)
     value = np.maximum(size, SHALLOW * size.max(axis=2, keepdims=True))
@@ -97,7 +108,26 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     i, j, k = (int(place) for place in np.unravel_index(int(shares.argmax()), shares.shape))
     value = float(shares[i, j, k])
     relative = value if value <= WARNED else float(errors[i, j, k] / size[i, j, k])  # that is what a user finds there
-    return EvaluationLoss(relative, float(abs(points[k])), i, j)
+    return EvaluationLoss(relative, float(abs(points[k])), i, j, estimated)
+
+
+def _hessenberg_rounding(sys: control.StateSpace, point: complex) -> FloatArray:
+    """Estimate what rounding of A's Hessenberg form changes at a point of m inputs and p outputs, (p, m, 1).
+
+    The form is that of A + E, where E is about as large in all places. With (s I - A) x = b and (s I - A)^T y = c the
+    response changes by y^T E x, a sum of n^2 terms of either sign: about n times one of mean size.
+    """
+    A, factors = balanced_states(np.asarray(sys.A, dtype=float))
+    n = len(A)
+    lu, pivots, _ = zgetrf(point * np.eye(n) - A)
+    x = factors[:, None] * zgetrs(lu, pivots, sys.B / factors[:, None])[0]
+    y = zgetrs(lu, pivots, (sys.C * factors).T, trans=1)[0] / factors[:, None]
+    rounding = HESSENBERG_ROUNDING / n * np.linalg.norm(sys.A)
+    return np.asarray(rounding * np.outer(np.linalg.norm(y, axis=0), np.linalg.norm(x, axis=0)))[:, :, None]
+
+
+def _part_in_words(loss: EvaluationLoss) -> str:
+    return f"{loss.value:.1e}" if not loss.estimated else "all" if loss.value >= 1.0 else f"about {loss.value:.0e}"
 
 
 def _points(A: FloatArray, at_origin: int) -> ComplexArray:

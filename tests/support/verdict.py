@@ -57,9 +57,12 @@ class Improved:
         return np.stack(values, axis=2)
 
     def terms_at(self, points: npt.ArrayLike) -> FloatArray:
-        """Evaluate the sizes of what is summed, ``|C| |(sI - A)^-1 B| + |D|``: (p, m, k)."""
-        unit, C, D = np.eye(len(self.A)), np.abs(self.C), np.abs(self.D)
-        values = [C @ np.abs(np.linalg.solve(s * unit - self.A, self.B)) + D for s in np.atleast_1d(np.asarray(points))]
+        """Evaluate the sizes of what is summed, where ``x = (A x + B) / s``: (p, m, k)."""
+        A, B, C, D = (np.abs(part) for part in (self.A, self.B, self.C, self.D))
+        values = []
+        for s in np.atleast_1d(np.asarray(points)):
+            x = np.abs(np.linalg.solve(s * np.eye(len(A)) - self.A, self.B))
+            values.append(C @ (x + (A @ x + B) / abs(s)) + D)
         return np.stack(values, axis=2)
 
     def _exactly(self, s: complex) -> ComplexArray:

@@ -40,6 +40,30 @@ def test_the_loss_is_that_of_python_control() -> None:
     assert loss.value / SIZE < abs(found / right - 1.0) < loss.value * SIZE
 
 
+@needs_slycot
+@pytest.mark.parametrize("elements", [60, 100])
+def test_the_estimate_for_many_states_is_that_of_what_is_measured(
+    elements: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At a frequency where both are known."""
+    sys = system_of_model(cantilever(elements))
+    monkeypatch.setattr("halfdof_ctrl.systems.evaluation_loss.EVALUATION_LOSS_MOST_STATES", 10)
+    loss = evaluation_loss(sys)
+    assert loss is not None
+    assert loss.estimated
+    point = np.array([1j * loss.omega])
+    right = system_response(sys, point).values[loss.output, loss.source, 0]
+    found = np.asarray(sys(point, squeeze=False))[loss.output, loss.source, 0]
+    assert loss.value / SIZE < abs(found / right - 1.0) < loss.value * SIZE
+
+
+@needs_slycot
+def test_more_than_a_thousand_states_are_told_of() -> None:
+    """A cantilever of 1040 states, of which python-control loses about half at its first mode."""
+    with pytest.warns(LostDigitsWarning, match=r"python-control's evaluation .* will lose about .* at 3\.5\d rad/s"):
+        mech2ss(cantilever(260))
+
+
 def test_well_posed_models_are_quiet() -> None:
     """The paper's mount, and 100 random mounts in SI units with all kinds of DOFs: at most one warning."""
     said = []

@@ -38,7 +38,6 @@ TOWARDS_REST = (1e-12, 1e-8, 1e-4, 0.1)  #: of the slowest frequency of a model 
 EXACTLY_COUNTED = 20  #: DOFs up to which poles at the origin are counted exactly, in a few milliseconds
 TOWARDS_FREE = 0.2  #: of the slowest other frequency of one with free motions, or, if the next is less, ...
 DRIFT = 1e-11  #: part of a value that poles of free motions, which rounding has moved from the origin, may change there
-BESIDE_DRIFT = 30.0  #: times the largest pole, if all should be at the origin: no other frequency says where to look
 NEAR_ORIGIN = 1e-3  #: of the slowest frequency: a slower pole may be one at the origin that rounding has moved
 BESIDE_CORNER = 1.2  #: times the frequency at which terms of a signal are of one size, for they may cancel there
 SAME_SPEED = 4.0  #: ratio of two frequencies of signals of which one is enough
@@ -138,8 +137,6 @@ def points_of_few(
         if exactly:  # typical frequencies are no rounding of free motions: they are looked at whatever drifts there
             least = min(least, TYPICAL_SPEEDS[0] * min(speeds))
         chosen = np.append(chosen[chosen > least], max(least, TOWARDS_FREE * chosen[0]))
-        if exactly and at_origin == sizes.size and sizes[-1] > 0.0:
-            chosen = np.append(chosen, BESIDE_DRIFT * sizes[-1])
         chosen.sort()
     still = at_origin > 0 or float(sizes.min(initial=np.inf)) < NEAR_ORIGIN * chosen[0]
     rest = chosen[0] * np.array(() if still else TOWARDS_REST)
