@@ -41,6 +41,7 @@ POINTS = np.array([0.3j, 1.1j, 4.7j, 0.618034 + 0.207107j])  # [rad/s]
 FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
 ANNOUNCED = 1e5  #: times the limits may be lost where LostDigitsWarning says so
 SILENT = 1e-9  #: of the largest entry of H(s): a larger error in A, B, C, D has to be told
+AT_POLE = 1e-6  #: relative distance: an undamped resonance itself determines nothing
 DRIFTING = 10.0  #: times what one pole that rounding has moved from the origin changes, or two that have
 FAR_BELOW = 1e-3  #: of the slowest pole that is not at the origin
 BESIDE = 1.1j  #: times that
@@ -120,6 +121,8 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
     output, loss = reduction.output, reduction.solution.evidence.loss
     stored = Improved(reduction.A, reduction.B, output.X, output.direct(len(model.inputs)), output.U[1:])
     points = POINTS / tau
+    roots = exact.eigenvalues()[0]
+    points = points[~(np.abs(points[:, None] - roots) < AT_POLE * np.abs(points[:, None])).any(axis=1)]
     also = polynomial_at(stored.polynomial, points, stored.D.shape)
     value = exact.at(points)
     zero = ~value.any(axis=2, keepdims=True)  # of nothing at all, any error is all: there the terms count
