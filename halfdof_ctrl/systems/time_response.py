@@ -69,6 +69,8 @@ def step_response(model: SecondOrderModel, timepts: npt.ArrayLike | None = None)
     -----
     DataLimitWarning
         Entries known to their last digit do not determine the motion to 1e-6, at a frequency that it shows.
+    LostDigitsWarning
+        States lose digits (see `mech2ss`), or steps beside poles that are many decades faster, of more than 500 states.
 
     Examples
     --------
@@ -120,7 +122,7 @@ def initial_response(
 
     Warns
     -----
-    DataLimitWarning
+    DataLimitWarning, LostDigitsWarning
         As in `step_response`.
 
     Examples
@@ -176,7 +178,7 @@ def forced_response(
 
     Warns
     -----
-    DataLimitWarning
+    DataLimitWarning, LostDigitsWarning
         As in `step_response`.
 
     Examples

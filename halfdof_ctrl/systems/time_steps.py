@@ -2,7 +2,7 @@
 
 python-control takes e^(A h) of a solver in doubles, which leaves u |A| h in each step. With poles a million times
 faster than the motion that is shown these add up to u |A| times its length: to 1e-7 of a motion of ten periods. Such
-systems take steps that are known to all digits of a double (`matrix_exponential`).
+systems take steps that are known to all digits of a double (`matrix_exponential`), and larger ones are told of.
 """
 
 from dataclasses import dataclass
@@ -10,11 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from halfdof_ctrl.base.arrays import UNIT_ROUNDOFF, FloatArray
+from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
 from halfdof_ctrl.base.matrix_exponential import exact_step
 from halfdof_ctrl.base.spectrum import balanced_states
 
 STEPS_LOSE = 1e-11  #: u |A| times the length of a response, up to which steps in doubles do; they lose some tenth of it
-STEPS_MOST_STATES = 200  #: up to which exact steps take a second
+STEPS_MOST_STATES = 500  #: up to which exact steps take no longer than the rest of a response; with more ...
+STEPS_TOLD = 1e-5  #: ... such a loss is told; it was a hundredth to a tenth of it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,6 +52,11 @@ def time_steps(A: FloatArray, B: FloatArray, time: FloatArray) -> TimeSteps | No
     -------
     TimeSteps or None
 
+    Warns
+    -----
+    LostDigitsWarning
+        Steps in doubles lose digits of a system for which exact ones take too long.
+
     Examples
     --------
     A pole of -1e9 beside one of -1 [rad/s]: after ten time constants of the slow one e^-10 is left of it.
@@ -62,11 +69,16 @@ def time_steps(A: FloatArray, B: FloatArray, time: FloatArray) -> TimeSteps | No
     >>> time_steps(np.array([[-2.0]]), np.ones((1, 1)), times) is None
     True
     """
-    if not 0 < len(A) <= STEPS_MOST_STATES:
+    if not len(A):
         return None
     matrix, scale = balanced_states(A)
     span = float(time[-1] - time[0])
-    if UNIT_ROUNDOFF * float(np.abs(matrix).sum(axis=0).max()) * span <= STEPS_LOSE:
+    lost = UNIT_ROUNDOFF * float(np.abs(matrix).sum(axis=0).max()) * span
+    if lost <= STEPS_LOSE:
+        return None
+    if len(A) > STEPS_MOST_STATES:
+        if lost > STEPS_TOLD:
+            _warn(lost, len(A), span)
         return None
     (change, rest), *driven = exact_step(matrix, B / scale[:, None], span / (time.size - 1))
     of_value, of_change = (scale[:, None] * (high + low) for high, low in driven)
@@ -74,3 +86,14 @@ def time_steps(A: FloatArray, B: FloatArray, time: FloatArray) -> TimeSteps | No
         return None  # a motion that grows beyond the largest number within a step
     transition = (np.eye(len(A)) + change + rest) * scale[:, None] / scale
     return TimeSteps(transition, of_value, of_change)
+
+
+def _warn(lost: float, states: int, span: float) -> None:
+    part = f"{lost:.0e} of the motion" if lost < 1.0 else "all of the motion"
+    msg = (
+        f"The steps in time of {states} states lose up to {part} in {span:.3g} s: some poles are far faster than what "
+        f"lasts so long, and steps that keep its digits are taken up to {STEPS_MOST_STATES} states. Give a shorter "
+        "time, or make static what is faster than all that you look at, with truncate_modes or by leaving its masses "
+        "and dampers out; frequency_response keeps the digits."
+    )
+    give_warning(msg, LostDigitsWarning)

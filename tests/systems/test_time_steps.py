@@ -6,6 +6,7 @@ import pytest
 
 from halfdof_ctrl import SecondOrderModel, forced_response, initial_response, mechss, step_response
 from halfdof_ctrl.base.arrays import FloatArray
+from halfdof_ctrl.errors import LostDigitsWarning
 from halfdof_ctrl.systems.time_steps import STEPS_MOST_STATES, time_steps
 
 PRECISION = 800  #: bits
@@ -83,7 +84,7 @@ def test_traces_are_followed_side_by_side() -> None:
     ("rate", "size"), [(1.0, 2), (1e9, STEPS_MOST_STATES + 1), (1e-300, 0)], ids=["slow", "many states", "none"]
 )
 def test_python_control_steps_where_that_loses_nothing_or_takes_less(rate: float, size: int) -> None:
-    """Poles as slow as the response need no other steps; beyond 200 states these would take too long."""
+    """Poles as slow as the response need no other steps; beyond 500 states these would take too long."""
     assert time_steps(-rate * np.eye(size), np.ones((size, 1)), np.linspace(0.0, 10.0, 11)) is None
 
 
@@ -91,3 +92,9 @@ def test_growth_beyond_all_numbers_is_left_to_python_control() -> None:
     """Which gives infinity, and the response is refused with the time."""
     with np.errstate(all="ignore"):
         assert time_steps(np.array([[1e9]]), np.ones((1, 1)), np.linspace(0.0, 10.0, 11)) is None
+
+
+def test_steps_that_lose_digits_of_many_states_are_told_of() -> None:
+    """A damper that follows within 1e-12 s, among more than 500 states: steps in doubles lose up to a thousandth."""
+    with pytest.warns(LostDigitsWarning, match=r"lose up to 1e-03 of the motion in 10 s: some poles are far faster"):
+        assert time_steps(-1e12 * np.eye(STEPS_MOST_STATES + 1), np.ones((501, 1)), np.linspace(0.0, 10.0, 11)) is None
