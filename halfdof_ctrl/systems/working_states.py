@@ -17,7 +17,7 @@ import scipy.linalg
 from halfdof_ctrl.base.arrays import LARGEST_DENSE_COPY, ComplexArray, FloatArray, IndexArray, is_zero
 from halfdof_ctrl.base.exact_products import ExactPolynomial
 from halfdof_ctrl.descriptor.data_limit import amplifies
-from halfdof_ctrl.model.evaluation import random_growth
+from halfdof_ctrl.model.evaluation import data_limit, random_growth
 from halfdof_ctrl.model.quadratics import Coefficients
 from halfdof_ctrl.model.refinement import COARSE_GROWTH, refined
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -38,6 +38,7 @@ SOUND_STORED = 1e-9  #: the same over rcond(W), which rounding of A and B is enl
 SOUND_RESPONSE = 2e-11  #: relative error at tested points up to which a model stays with the states it has
 FEW_STATES = 60  #: up to which two evaluations cost nothing to speak of
 SOLVING_EFFORT = 1e9  #: points times cubed DOFs up to which refined solves take the place of both evaluations
+PEAK = 100.0  #: times what rounding of entries changes elsewhere, it changes beside an undamped resonance
 MOST_TESTED = 8  #: points of a response at which a refined solve tells which evaluation is better
 
 
@@ -218,18 +219,28 @@ def _is_free_at_rest(model: SecondOrderModel, points: ComplexArray) -> bool:
 
 
 def _is_sound(model: SecondOrderModel, values: ComplexArray, points: ComplexArray) -> bool:
-    """Return whether energy coordinates are right at some points, the smallest and the largest values among them."""
+    """Return whether values are right at some points, the smallest and the largest values among them.
+
+    Beside an undamped resonance, which entries determine much less than the rest, as far as they do.
+    """
     size = np.abs(values).reshape(-1, points.size)
     with np.errstate(invalid="ignore"):
         extremes = [int(np.nanargmin(size.min(axis=0))), int(np.argmax(np.nan_to_num(size, posinf=0.0).max(axis=0)))]
     tested = np.unique(np.append(_spread(points.size), extremes))
-    return _agree(values[:, :, tested], refined_response(model, points[tested]))
+    exact = refined_response(model, points[tested])
+    if _agree(values[:, :, tested], exact):
+        return True
+    data, size = data_limit(*model.quadratics, points[tested]).data, np.abs(exact)
+    shares = np.divide(data, size, out=np.zeros(size.shape), where=size > 0.0)
+    usual = np.median(shares, axis=2, keepdims=True)
+    return _agree(values[:, :, tested], exact, np.where(shares > PEAK * usual, data, 0.0))
 
 
-def _agree(values: ComplexArray, exact: ComplexArray) -> bool:
+def _agree(values: ComplexArray, exact: ComplexArray, room: FloatArray | float = 0.0) -> bool:
     known = np.isfinite(exact)  # elsewhere P(s) is singular
     with np.errstate(invalid="ignore"):
-        return bool((np.abs(values - exact)[known] <= SOUND_RESPONSE * np.abs(exact[known])).all())
+        allowed = np.maximum(SOUND_RESPONSE * np.abs(exact), room)
+        return bool((np.abs(values - exact)[known] <= allowed[known]).all())
 
 
 def _spread(count: int) -> IndexArray:
