@@ -132,7 +132,7 @@ def _compared(model: SecondOrderModel, sys: control.StateSpace) -> CrossCheck:
         transfer = compare_transfer(model, sys, points, *transfer_of_both(model, sys, points, advance))
         of_poles = compare_poles(model, poles, finite, bounds, gamma, most=structure.most_finite)
         advance(1)
-        steps = compare_steps(model, sys, moving, transfer.zero_scale)
+        steps = compare_steps(model, sys, moving, transfer.zero_scale, transfer.least)
         advance(1)
         return CrossCheck(
             order=sys.nstates,

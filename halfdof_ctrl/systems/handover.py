@@ -6,14 +6,16 @@ import control
 import numpy as np
 from scipy.linalg.lapack import dgetrf
 
-from halfdof_ctrl.base.arrays import EPS, FloatArray, has_even_entries, is_zero
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, has_even_entries, is_zero
 from halfdof_ctrl.base.spectrum import balanced
 from halfdof_ctrl.model.free_motions import FREE_MOTIONS_LARGEST, free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
+from halfdof_ctrl.reduction.algebra.leading_matrix import FEW_DOFS
 from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.evidence import warn_of_lost_digits
 from halfdof_ctrl.reduction.method.loss import TEN_TIMES_DATA, loss_of, measured
 from halfdof_ctrl.reduction.method.loss_bound import is_well_conditioned
+from halfdof_ctrl.reduction.method.loss_points import AT_ORIGIN, BESIDE_MODE
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver, scaled_pencil_solver
 from halfdof_ctrl.reduction.method.signals import Signal, trimmed
 from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
@@ -22,6 +24,8 @@ from halfdof_ctrl.systems.state_map import States
 
 SURE_STATES = 120  #: up to which such a measurement is spared where A is well conditioned
 MEASURED_STATES = 1000  #: in energy or modal states, of which it is measured what they lose
+MODES_TRIED = 6  #: of all, besides the slowest
+DEEP = 1e-6  #: of a channel's largest value: deeper in the roll-off, a loss is measured by that
 NEARLY_NO_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
@@ -63,7 +67,8 @@ def warn_of_stored(reduction: ExactReduction, sys: control.StateSpace) -> None:
         return
     A, B, C, D = (np.asarray(part, dtype=float) for part in (sys.A, sys.B, sys.C, sys.D))
     signal = Signal(C, trimmed((D, *reduction.polynomial_part)))
-    loss = loss_of(measured(_HandedOver(model, A, B, signal)), allowed=TEN_TIMES_DATA)
+    measurement = measured(_HandedOver(model, A, B, signal), _over_modes(A))
+    loss = loss_of(measurement, allowed=TEN_TIMES_DATA, deep=DEEP if len(model.dofs) > FEW_DOFS else 0.0)
     cause = "strains and momenta hold what cancels in an output to rounding of its terms alone"
     warn_of_lost_digits(loss, cause)
 
@@ -93,6 +98,14 @@ def warn_of_python_control(model: SecondOrderModel, sys: control.StateSpace, sta
         return
     if not even:
         warn_of_evaluation(sys, states, at_origin=0 if free is None else free.poles)
+
+
+def _over_modes(A: FloatArray) -> ComplexArray:
+    """Return frequencies over all modes: what strains and momenta hold of an output cancels in its roll-off."""
+    size = np.abs(np.linalg.eigvals(balanced(A)))
+    size = np.sort(size[size > AT_ORIGIN * size.max(initial=0.0)])
+    places = np.unique(np.linspace(0, size.size - 1, MODES_TRIED).astype(np.intp))
+    return np.asarray(1j * BESIDE_MODE * size[places])
 
 
 def _cancels(model: SecondOrderModel, sys: control.StateSpace) -> bool:

@@ -42,7 +42,7 @@ class StepCheck:
 
 
 def compare_steps(
-    model: SecondOrderModel, sys: control.StateSpace, moving: ComplexArray, zero_scale: FloatArray
+    model: SecondOrderModel, sys: control.StateSpace, moving: ComplexArray, zero_scale: FloatArray, least: FloatArray
 ) -> StepCheck:
     """Follow the response to a step of each input, segment by segment.
 
@@ -57,6 +57,9 @@ def compare_steps(
         Eigenvalues that are not at the origin.
     zero_scale : (p, m, 1) ndarray
         What channels that are zero are measured by; 0 for the others.
+    least : (p, m, 1) ndarray
+        What others are measured by at least: of many states the response is followed for so short a time that what
+        stands far from the force has hardly begun to move.
     """
     if any(matrix.any() for matrix in (model.Bv, model.Ba, model.Dv, model.Da)):
         return _not_followed("a step has no derivative for Bv, Ba, Dv, Da")
@@ -71,6 +74,7 @@ def compare_steps(
     run_away = ~np.isfinite(exact).all(axis=2, keepdims=True)
     exact = np.where(run_away, found, exact)
     largest = np.where(zero_scale > 0.0, zero_scale, np.abs(exact).max(axis=2, keepdims=True))
+    largest = np.maximum(largest, least)
     largest = np.where(largest > 0.0, largest, 1.0)  # no response at all
     difference = np.abs(found - exact)
     room = np.zeros(largest.shape)

@@ -43,6 +43,7 @@ class TransferCheck:
 
     judged: Judged
     zero_scale: FloatArray  #: (p, m, 1) what a channel that is zero is measured by; 0 for the others
+    least: FloatArray  #: (p, m, 1) the smallest value that counts as more than the beginning of a response
     pointwise: float  #: largest error relative to each value
     data: float  #: what the entries of M, C, K determine the transfer function to, the worst relative figure
     data_worst: str
@@ -123,6 +124,7 @@ def compare_transfer(
     return TransferCheck(
         judged=Judged(grade, float(errors.ravel()[place]), float(allowed.ravel()[place]), _where(model, points, place)),
         zero_scale=np.where(measure.is_zero, measure.scale, 0.0),
+        least=DEEP * np.nan_to_num(np.abs(exact.values)).max(axis=2, keepdims=True, initial=0.0),
         pointwise=float(np.where(measure.is_zero, 0.0, pointwise).max(initial=0.0)),
         data=float(shares.max(initial=0.0)),
         data_worst=_where(model, points, int(shares.argmax())),

@@ -141,9 +141,9 @@ def measured_loss(stored: Stored) -> Loss:
     return loss_of(measured(stored))
 
 
-def measured(stored: Stored) -> Measurement:
-    """Compare the stored system with the model at the frequencies that are looked at, for `loss_of` to judge."""
-    comparison = _Comparison.of(stored)
+def measured(stored: Stored, also: ComplexArray | None = None) -> Measurement:
+    """Compare the stored system with the model at the frequencies that are looked at, and others, to be judged."""
+    comparison = _Comparison.of(stored, also)
     points = comparison.points
     together = comparison.is_small or not stored.model.is_sparse  # which takes a few times the room
     groups = _neighbours(points) if together else [points[k : k + 1] for k in range(points.size)]
@@ -151,12 +151,12 @@ def measured(stored: Stored) -> Measurement:
     return Measurement(stored.model, comparison.chosen, comparison.slow, found)
 
 
-def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
+def loss_of(measurement: Measurement, allowed: float = 0.0, deep: float = 0.0) -> Loss:
     """Return what is lost, where that is most.
 
     Relative to what the channel would be if it fell by s^3 from where it is largest, or to its part that grows with
     frequency and is in no state space, where these are larger. What is at most `allowed` times what rounding of M, C
-    and K at random changes is none.
+    and K at random changes is none. A value below the part `deep` of the channel's largest is measured by that.
     """
     found = measurement.found
     if not found:
@@ -172,6 +172,7 @@ def loss_of(measurement: Measurement, allowed: float = 0.0) -> Loss:
     value = np.where((value > rounding_of_zeros(value)).any(axis=0), value, 0.0)
     gentle = is_gentle(np.abs(at), value)
     size = np.maximum(np.maximum(value, grown), np.where(gentle, 0.0, slopes_from(np.abs(at), value)))
+    size = np.maximum(size, deep * value.max(axis=0, initial=0.0))
     kinds = least_powers(measurement.model, measurement.chosen)
     missed = np.where(is_looked_at(np.abs(at), value, measurement.slow, kinds), missed, 0.0)
     relative = np.divide(missed, size, out=np.zeros(size.shape), where=size > 0.0)
@@ -218,13 +219,15 @@ class _Comparison:
     unrounded: bool  #: whether no entry of M, C and K fills the digits of a double
 
     @classmethod
-    def of(cls, stored: Stored) -> "_Comparison":
+    def of(cls, stored: Stored, also: ComplexArray | None = None) -> "_Comparison":
         model, m, N = stored.model, stored.B.shape[1], len(stored.A)
         chosen = looked_at(m, MOST_INPUTS)
         few = len(model.dofs) <= FEW_DOFS
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
         if points.size and falls_towards_rest(model, chosen):
             points = np.append(points, one_below(points))
+        if also is not None and not few:
+            points = np.append(points, also)
         points = points[np.argsort(np.abs(points))]
         speeds = typical_speeds(model) if few else [float(np.median(np.abs(points))) if N else 1.0]
         speed = speeds[-1]
