@@ -42,6 +42,7 @@ FAR = np.array([0.3j, 1.1j, 4.7j, 1e2j, 1e3j])  # [rad/s] into the roll-off
 ANNOUNCED = 1e5  #: times the limits may be lost where LostDigitsWarning says so
 SILENT = 1e-9  #: of the largest entry of H(s): a larger error in A, B, C, D has to be told
 AT_POLE = 1e-6  #: relative distance: an undamped resonance itself determines nothing
+NO_NUMBER = 1e-100  #: what is left of zero in 600 bits
 DRIFTING = 10.0  #: times what one pole that rounding has moved from the origin changes, or two that have
 FAR_BELOW = 1e-3  #: of the slowest pole that is not at the origin
 BESIDE = 1.1j  #: times that
@@ -128,7 +129,7 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
     zero = ~value.any(axis=2, keepdims=True)  # of nothing at all, any error is all: there the terms count
     size = np.maximum(np.abs(value), np.abs(also)).max(axis=(0, 1), initial=0.0)
     size = np.where(zero, np.maximum(stored.balanced().terms_at(points), size), size)
-    error = np.abs(stored.exactly_at(points) - value) / np.where(size > 0.0, size, 1.0)
+    error = np.abs(stored.exactly_at(points) - value) / np.where(size > NO_NUMBER, size, 1.0)
     finding.errors["stored"] = float(error.max(initial=0.0))
     silent = finding.errors["stored"] > SILENT and "LostDigitsWarning" not in finding.said
     if silent and (error <= SILENT + _usual(stored, exact, points, value)).all():
