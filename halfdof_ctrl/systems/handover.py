@@ -67,8 +67,9 @@ def warn_of_stored(reduction: ExactReduction, sys: control.StateSpace) -> None:
         return
     A, B, C, D = (np.asarray(part, dtype=float) for part in (sys.A, sys.B, sys.C, sys.D))
     signal = Signal(C, trimmed((D, *reduction.polynomial_part)))
-    measurement = measured(_HandedOver(model, A, B, signal), _over_modes(A))
-    loss = loss_of(measurement, allowed=TEN_TIMES_DATA, deep=DEEP if len(model.dofs) > FEW_DOFS else 0.0)
+    handed, few = _HandedOver(model, A, B, signal), len(model.dofs) <= FEW_DOFS
+    measurement = measured(handed, None if few else _over_modes(A))
+    loss = loss_of(measurement, allowed=TEN_TIMES_DATA, deep=0.0 if few else DEEP)
     cause = "strains and momenta hold what cancels in an output to rounding of its terms alone"
     warn_of_lost_digits(loss, cause)
 
@@ -104,8 +105,8 @@ def _over_modes(A: FloatArray) -> ComplexArray:
     """Return frequencies over all modes: what strains and momenta hold of an output cancels in its roll-off."""
     size = np.abs(np.linalg.eigvals(balanced(A)))
     size = np.sort(size[size > AT_ORIGIN * size.max(initial=0.0)])
-    places = np.unique(np.linspace(0, size.size - 1, MODES_TRIED).astype(np.intp))
-    return np.asarray(1j * BESIDE_MODE * size[places])
+    places = np.linspace(0, size.size - 1, MODES_TRIED).astype(np.intp) if size.size else np.zeros(0, dtype=np.intp)
+    return np.asarray(1j * BESIDE_MODE * size[np.unique(places)])
 
 
 def _cancels(model: SecondOrderModel, sys: control.StateSpace) -> bool:

@@ -13,7 +13,7 @@ import sys
 import time
 import warnings
 from collections import defaultdict
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -128,7 +128,10 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
     value = exact.at(points)
     zero = ~value.any(axis=2, keepdims=True)  # of nothing at all, any error is all: there the terms count
     size = np.maximum(np.abs(value), np.abs(also)).max(axis=(0, 1), initial=0.0)
-    size = np.where(zero, np.maximum(stored.balanced().terms_at(points), size), size)
+    if zero.any():
+        size = np.where(
+            zero, np.maximum(np.maximum(stored.balanced().terms_at(points), _other(model, points)), size), size
+        )
     error = np.abs(stored.exactly_at(points) - value) / np.where(size > NO_NUMBER, size, 1.0)
     finding.errors["stored"] = float(error.max(initial=0.0))
     silent = finding.errors["stored"] > SILENT and "LostDigitsWarning" not in finding.said
@@ -147,6 +150,16 @@ def judged_near(model: hd.SecondOrderModel, tau: float = 1.0) -> Finding:
             f"lost {loss.there:.1e} is told, {true:.1e} is right, at {loss.omega * tau:.1e} / tau"
         )
     return finding
+
+
+def _other(model: hd.SecondOrderModel, points: np.ndarray) -> np.ndarray:
+    """Give the sizes of responses to forces, seen by outputs, of other sizes in the same places: no terms cancel."""
+    generator = np.random.default_rng(0)
+    letters = [letter for letter in LETTERS if letter not in "MCK"]
+    parts = {
+        letter: getattr(model, letter) * generator.integers(5, 16, getattr(model, letter).shape) for letter in letters
+    }
+    return np.abs(rational.rational_transfer(replace(model, **parts)).at(points))
 
 
 def _usual(stored: Improved, exact: rational.RationalTransfer, points: np.ndarray, value: np.ndarray) -> np.ndarray:

@@ -121,3 +121,11 @@ def test_roll_off_of_many_modes_is_looked_at() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error", LostDigitsWarning)
         mech2ss(branched_chain(0), states="modal")
+
+
+@pytest.mark.parametrize("masses", [1, 70])
+def test_models_of_free_masses_alone_have_no_modes_to_look_at(masses: int) -> None:
+    """All poles are at the origin."""
+    for states in ("energy", "modal"):
+        sys = mech2ss(mechss(np.eye(masses), None, np.zeros((masses, masses))), states=states)
+        assert not np.linalg.eigvals(sys.A).any()

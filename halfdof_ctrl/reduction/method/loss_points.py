@@ -79,6 +79,8 @@ def _slow_eigenvalues(A: FloatArray) -> tuple[ComplexArray, FloatArray]:
     matrix, _ = balanced_states(A)
     factors, shift = dgetrf(matrix)[:2], 0.0  # says nothing of free motions, which are looked after below
     pivots = np.abs(np.diag(factors[0]))
+    if not pivots.any():  # nothing but free motions
+        return np.zeros(0, dtype=np.complex128), np.zeros(0)
     if pivots.min() <= N * EPS * pivots.max():  # free motions: look beside zero
         shift = -BESIDE_ZERO * float(np.exp(np.log(np.maximum(pivots, EPS * pivots.max())).mean()))
         factors = dgetrf(matrix - shift * np.eye(N))[:2]
