@@ -119,7 +119,7 @@ def mech2ss(
         A, B, C and D in the states that are asked for lose more than 1e-9 of an output; poles at the origin, of motions
         that K and C leave free, are moved by rounding; or python-control's evaluation of this system (``sys(s)``,
         `control.bode_plot`) will lose more than 1e-6, since it does not balance states of different sizes. Measured
-        beside modes and below them, for up to 1000 states.
+        beside modes and below them, for up to 1000 states, and estimated beyond.
 
     Examples
     --------
