@@ -13,22 +13,20 @@ from dataclasses import dataclass
 import control
 import numpy as np
 from control.exception import slycot_check
-from scipy.linalg.lapack import dgebal, zgetrf, zgetrs
+from scipy.linalg.lapack import dgebal
 
 from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray
 from halfdof_ctrl.base.errors import LostDigitsWarning, give_warning
-from halfdof_ctrl.base.spectrum import balanced, balanced_states
-from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE, loss_points
+from halfdof_ctrl.base.spectrum import balanced
+from halfdof_ctrl.model.weak_directions import Factors
+from halfdof_ctrl.reduction.method.loss_points import BELOW_ALL, BESIDE_MODE, loss_points, over_modes
 from halfdof_ctrl.systems.transfer_check import system_response
 
 WARNED = 1e-6  #: part of the value from which a loss is told
 UNEVEN = 1e4  #: change of A by balancing, in its norm times the range of the factors, from which it is measured
 EVALUATION_LOSS_MOST_STATES = 1000  #: for which it is measured: beyond, it is estimated
-HESSENBERG_ROUNDING = (
-    EPS / 3.0
-)  #: of the norm of A, times 1/n: what an entry changes (in 83 responses: 0.03 to 6 of it)
+HESSENBERG_ROUNDING = EPS / 3.0  #: of the norm of A, over n: what each entry changes; 0.4 to 17 times what was found
 EVALUATION_LOSS_MANY_STATES = 200  #: from which it is measured at one frequency alone
-FASTER_POINTS = 6  #: frequencies besides the slowest ones, over all others: what is lost may show at any mode
 BESIDE_ORIGIN = 1.01  #: times the largest pole that stands for one at the origin: frequencies up to there are not tried
 SHALLOW = 1e-3  #: of a channel's largest value: below, a loss is measured by that
 EVALUATION_LOSS_ZERO_CHANNEL = 100.0  #: times what rounding of A, B, C, D changes in it: a smaller channel is zero
@@ -92,16 +90,11 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     estimated = len(A) > EVALUATION_LOSS_MOST_STATES and slycot_check()  # without it control solves once, as we do here
     points = points[:1] if estimated else points
     right = system_response(sys, points)
-    if estimated:
-        found = right.values + np.minimum(_hessenberg_rounding(sys, points[0]), np.abs(right.values))
-    else:
-        found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
     size = np.nan_to_num(np.abs(right.values))
+    errors = np.minimum(_hessenberg_rounding(sys, points[0]), size) if estimated else _errors(sys, points, right.values)
     seen = (size > EVALUATION_LOSS_ZERO_CHANNEL * np.nan_to_num(right.data, nan=np.inf)).any(axis=2, keepdims=True)
     value = np.maximum(size, SHALLOW * size.max(axis=2, keepdims=True))
     told = seen & np.isfinite(right.values) & (value > 0.0)
-    with np.errstate(invalid="ignore", over="ignore"):
-        errors = np.nan_to_num(np.abs(found - right.values), nan=np.inf)
     shares = np.divide(errors, value, out=np.zeros(value.shape), where=told)
     if not shares.size:
         return None
@@ -111,17 +104,23 @@ def evaluation_loss(sys: control.StateSpace, at_origin: int = 0) -> EvaluationLo
     return EvaluationLoss(relative, float(abs(points[k])), i, j, estimated)
 
 
+def _errors(sys: control.StateSpace, points: ComplexArray, right: ComplexArray) -> FloatArray:
+    found = np.asarray(sys(points, squeeze=False, warn_infinite=False))
+    with np.errstate(invalid="ignore", over="ignore"):
+        return np.asarray(np.nan_to_num(np.abs(found - right), nan=np.inf))
+
+
 def _hessenberg_rounding(sys: control.StateSpace, point: complex) -> FloatArray:
     """Estimate what rounding of A's Hessenberg form changes at a point of m inputs and p outputs, (p, m, 1).
 
     The form is that of A + E, where E is about as large in all places. With (s I - A) x = b and (s I - A)^T y = c the
     response changes by y^T E x, a sum of n^2 terms of either sign: about n times one of mean size.
     """
-    A, factors = balanced_states(np.asarray(sys.A, dtype=float))
-    n = len(A)
-    lu, pivots, _ = zgetrf(point * np.eye(n) - A)
-    x = factors[:, None] * zgetrs(lu, pivots, sys.B / factors[:, None])[0]
-    y = zgetrs(lu, pivots, (sys.C * factors).T, trans=1)[0] / factors[:, None]
+    n = sys.nstates
+    factors = Factors.of_dense(point * np.eye(n) - sys.A)
+    if factors is None:
+        return np.full((sys.noutputs, sys.ninputs, 1), np.inf)
+    x, y = factors.solve(sys.B.astype(np.complex128)), factors.solve_transposed(sys.C.T.astype(np.complex128))
     rounding = HESSENBERG_ROUNDING / n * np.linalg.norm(sys.A)
     return np.asarray(rounding * np.outer(np.linalg.norm(y, axis=0), np.linalg.norm(x, axis=0)))[:, :, None]
 
@@ -142,11 +141,8 @@ def _points(A: FloatArray, at_origin: int) -> ComplexArray:
         return points[:1]
     slowest = float(np.abs(points).min())
     faster = size[size > slowest]
-    spread = (
-        faster[np.unique(np.linspace(0, faster.size - 1, FASTER_POINTS).astype(np.intp))] if faster.size else faster
-    )
     below = max(BELOW_ALL * slowest, still)
-    return np.concatenate([points, 1j * BESIDE_MODE * np.append(spread, below)])
+    return np.concatenate([points, over_modes(faster), [1j * BESIDE_MODE * below]])
 
 
 def _is_uneven(A: FloatArray) -> bool:

@@ -15,17 +15,16 @@ from halfdof_ctrl.reduction.exact_reduction import ExactReduction
 from halfdof_ctrl.reduction.method.evidence import warn_of_lost_digits
 from halfdof_ctrl.reduction.method.loss import TEN_TIMES_DATA, loss_of, measured
 from halfdof_ctrl.reduction.method.loss_bound import is_well_conditioned
-from halfdof_ctrl.reduction.method.loss_points import AT_ORIGIN, BESIDE_MODE
+from halfdof_ctrl.reduction.method.loss_points import AT_ORIGIN, over_modes
 from halfdof_ctrl.reduction.method.refined_answers import Solver, StateSolver, scaled_pencil_solver
 from halfdof_ctrl.reduction.method.signals import Signal, trimmed
 from halfdof_ctrl.systems.evaluation_loss import warn_of_evaluation
 from halfdof_ctrl.systems.free_motion_warning import warn_of_free_motions
 from halfdof_ctrl.systems.state_map import States
+from halfdof_ctrl.systems.transfer_check import DEEP
 
 SURE_STATES = 120  #: up to which such a measurement is spared where A is well conditioned
 MEASURED_STATES = 1000  #: in energy or modal states, of which it is measured what they lose
-MODES_TRIED = 6  #: of all, besides the slowest
-DEEP = 1e-6  #: of a channel's largest value: deeper in the roll-off, a loss is measured by that
 NEARLY_NO_PIVOT = 1e6 * EPS  #: of the largest: a smaller one may be what is left of a zero
 
 
@@ -104,9 +103,7 @@ def warn_of_python_control(model: SecondOrderModel, sys: control.StateSpace, sta
 def _over_modes(A: FloatArray) -> ComplexArray:
     """Return frequencies over all modes: what strains and momenta hold of an output cancels in its roll-off."""
     size = np.abs(np.linalg.eigvals(balanced(A)))
-    size = np.sort(size[size > AT_ORIGIN * size.max(initial=0.0)])
-    places = np.linspace(0, size.size - 1, MODES_TRIED).astype(np.intp) if size.size else np.zeros(0, dtype=np.intp)
-    return np.asarray(1j * BESIDE_MODE * size[np.unique(places)])
+    return over_modes(np.sort(size[size > AT_ORIGIN * size.max(initial=0.0)]))
 
 
 def _cancels(model: SecondOrderModel, sys: control.StateSpace) -> bool:

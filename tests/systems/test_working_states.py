@@ -80,11 +80,12 @@ def test_accelerations_keep_their_digits_towards_rest() -> None:
     assert_allclose(frequency_response(model, omega).complex, transfer(model, 1j * omega)[0, 0], rtol=EVALUATED)
 
 
-def test_a_tip_of_a_resonance_does_not_cost_the_digits_of_the_rest() -> None:
-    """A chain of 41 masses whose only damper is weak: at the tips entries determine little, elsewhere DOF states do.
+def test_a_tip_of_a_resonance_does_not_decide_against_dof_states(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A chain of 41 masses whose only damper is weak, a pole of 1e9 rad/s: entries determine little at the tips alone.
 
-    Energy states lose 1e-8 beside the pole of 1e9 rad/s that the damper makes. The tips themselves are left out.
+    DOF states are right elsewhere, and no energy states are asked, which a factorization at each point would mend.
     """
+    monkeypatch.setattr("halfdof_ctrl.systems.working_states.response_of_form", lambda *_: pytest.fail("energy states"))
     n = 42
     K = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
     K[-1, -1], K[3, 3], K[-1, 3], K[3, -1], K[-1, -2], K[-2, -1] = 1.0, 3.0, -1.0, -1.0, 0.0, 0.0

@@ -47,6 +47,7 @@ from halfdof_ctrl.reduction.method.long_answers import long_responses
 from halfdof_ctrl.reduction.method.loss_points import (
     NOTHING_SLOW,
     Slow,
+    looked_at,
     loss_points,
     one_below,
     points_of_few,
@@ -200,11 +201,6 @@ def _neighbours(points: ComplexArray) -> list[ComplexArray]:
     return groups
 
 
-def looked_at(count: int, most: int) -> IndexArray:
-    """Choose some of many, spread over all."""
-    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
-
-
 @dataclass(frozen=True, slots=True, eq=False, kw_only=True)
 class _Comparison:
     """A model and its stored state space in even units, for chosen inputs."""
@@ -226,7 +222,7 @@ class _Comparison:
         points = loss_points(stored.A) if N and not few else np.zeros(0, dtype=np.complex128)
         if points.size and falls_towards_rest(model, chosen):
             points = np.append(points, one_below(points))
-        if also is not None and not few:
+        if also is not None:
             points = np.append(points, also)
         points = points[np.argsort(np.abs(points))]
         speeds = typical_speeds(model) if few else [float(np.median(np.abs(points))) if N else 1.0]

@@ -16,7 +16,7 @@ import scipy.linalg
 from scipy.linalg.lapack import dgetrf
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigs
 
-from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, as_dense
+from halfdof_ctrl.base.arrays import EPS, ComplexArray, FloatArray, IndexArray, as_dense
 from halfdof_ctrl.base.spectrum import balanced_states, eigenvalues_and_rounding
 from halfdof_ctrl.model.free_motions import free_motion_count
 from halfdof_ctrl.model.second_order import SecondOrderModel
@@ -29,6 +29,7 @@ SLOW_MODES = 6  #: of more states, that are looked for
 SLOW_MODES_ACCURACY = 1e-3  #: accuracy of these
 MOST_FREQUENCIES = 4  #: frequencies that are chosen
 BESIDE_MODE = 1.003  #: times the frequency of a mode: an undamped resonance itself determines nothing
+MODES_TRIED = 6  #: besides the slowest ones, over all: what is lost may show at any mode
 BELOW_ALL = 0.1  #: times the slowest of them, where responses begin to be looked at
 AT_ORIGIN = 1e-12  #: of the largest eigenvalue found: one below is no frequency
 TYPICAL_SPEEDS = (0.2, 0.55, 1.6, 4.4)  #: looked at in a model of few DOFs as well, in units of its time scale
@@ -60,6 +61,16 @@ def beside_modes(moving: ComplexArray) -> ComplexArray:
     swinging, real = np.abs(moving[moving.imag > 0.0]), np.abs(moving[moving.imag == 0.0])
     chosen = np.concatenate([swinging[: MOST_FREQUENCIES - 1], real[:1]])
     return np.asarray(1j * BESIDE_MODE * (chosen if chosen.size else np.ones(1)))
+
+
+def over_modes(sizes: FloatArray) -> ComplexArray:
+    """Choose points beside some of the modes whose sizes are given in rising order, spread over all."""
+    return np.asarray(1j * BESIDE_MODE * sizes[looked_at(sizes.size, MODES_TRIED)])
+
+
+def looked_at(count: int, most: int) -> IndexArray:
+    """Choose some of many, spread over all."""
+    return np.unique(np.linspace(0, count - 1, min(count, most)).astype(np.intp))
 
 
 def one_below(points: ComplexArray) -> ComplexArray:
@@ -202,8 +213,7 @@ def signal_speeds(coefficients: Sequence[FloatArray]) -> list[float]:
 def _apart(speeds: FloatArray) -> FloatArray:
     """Return some frequencies that differ."""
     logs = np.unique(np.rint(np.log(speeds) / np.log(SAME_SPEED)))
-    places = np.unique(np.linspace(0, logs.size - 1, min(logs.size, MOST_OF_SIGNALS)).astype(np.intp))
-    return np.asarray(BESIDE_CORNER * SAME_SPEED ** logs[places])
+    return np.asarray(BESIDE_CORNER * SAME_SPEED ** logs[looked_at(logs.size, MOST_OF_SIGNALS)])
 
 
 def _end_of_drift(moved: FloatArray) -> float:

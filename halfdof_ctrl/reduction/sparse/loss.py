@@ -32,7 +32,6 @@ from halfdof_ctrl.reduction.method.loss import (
     Measured,
     Measurement,
     Stored,
-    looked_at,
 )
 from halfdof_ctrl.reduction.method.loss_points import (
     ALL_EIGENVALUES,
@@ -41,6 +40,7 @@ from halfdof_ctrl.reduction.method.loss_points import (
     SLOW_MODES,
     SLOW_MODES_ACCURACY,
     beside_modes,
+    looked_at,
     loss_points,
     one_below,
 )
